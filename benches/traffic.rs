@@ -1,8 +1,9 @@
 //! Drives cars alone on many roads and prints what must be 0, what is served, and the time of a step.
 //!
-//! `cargo run --release --example traffic -- [STEPS] [VANS]`: 20,000 steps on each road at each demand and no vans
-//! unless stated. Roads are the study's, those of the shipped maps, and random ones: wide/2026/240 to 269 and
-//! mixed/2026/0 to 49. The time is that of one core, with 24 slots.
+//! `cargo run --release --example traffic -- [STEPS] [VANS] [LARGE]`: 20,000 steps on each road at each demand, no vans
+//! and no buses, rigid trucks and tractor-trailers, of which there are as many each, unless stated. Roads are the
+//! study's, those of the shipped maps, and random ones: wide/2026/240 to 269 and mixed/2026/0 to 49. The time is that
+//! of one core, with 24 slots.
 
 use std::error::Error;
 use std::path::Path;
@@ -28,6 +29,7 @@ struct Seen {
     came: u64,
     stayed: u64,
     left: u64,
+    removed: u64,
     stepping: Duration,
 }
 
@@ -41,6 +43,7 @@ impl Seen {
         self.came += other.came;
         self.stayed += other.stayed;
         self.left += other.left;
+        self.removed += other.removed;
         self.stepping += other.stepping;
     }
 
@@ -48,7 +51,7 @@ impl Seen {
         let steps = self.steps as f64;
         format!(
             "{name:16} {demand:5} veh/h: {:9} steps, {} with overlaps, longest standing {:.0} s, {} off their path, \
-             {:.1} cars, served {:.0} veh/h, stayed away {:.2} %, {:.2} us a step",
+             {:.1} cars, served {:.0} veh/h, stayed away {:.2} %, {} removed, {:.2} us a step",
             self.steps,
             self.steps_with_overlaps,
             f64::from(self.longest_standing) * 0.1,
@@ -56,6 +59,7 @@ impl Seen {
             self.cars as f64 / steps,
             self.left as f64 * 36_000.0 / steps,
             100.0 * self.stayed as f64 / self.came.max(1) as f64,
+            self.removed,
             self.stepping.as_secs_f64() * 1e6 / steps
         )
     }
@@ -70,6 +74,7 @@ fn driven(network: &Network, demand: &Demand, steps: u64, seed: u32) -> Seen {
             Event::Came(_) => seen.came += 1,
             Event::Stayed(_) => (seen.came, seen.stayed) = (seen.came + 1, seen.stayed + 1),
             Event::Left(_) => seen.left += 1,
+            Event::Removed(_) => seen.removed += 1,
             Event::Entered(..) => {}
         });
         seen.stepping += begun.elapsed();
@@ -88,6 +93,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let steps = arguments.next().map_or(Ok(20_000), |word| word.parse::<u64>())?;
     let vans = arguments.next().map_or(Ok(0.0), |word| word.parse::<f32>())?;
+    let large = arguments.next().map_or(Ok(0.0), |word| word.parse::<f32>())?;
+    let mix = Mix { vans, rude: 0.0, large: [large / 3.0; 3] };
     let maps = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/maps");
     let mut groups: Vec<(String, Vec<Road>)> = Vec::new();
     for name in ["16m", "20m", "32m", "40m", "50m"] {
@@ -102,11 +109,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let mut worst = Seen::default();
     for (name, roads) in &groups {
-        let networks = roads.par_iter().map(Network::bake).collect::<Result<Vec<Network>, _>>()?;
+        let baked = |road: &Road| Network::cached(road, mix.has_large(), None);
+        let networks = roads.par_iter().map(baked).collect::<Result<Vec<Network>, _>>()?;
         for demand in DEMANDS {
             let seen = networks.par_iter().enumerate().filter_map(|(index, network)| {
                 let flows = Demand::even(network, demand);
-                let demand = Demand::new(network, &flows, Mix { vans, rude: 0.0 }).ok()?;
+                let demand = Demand::new(network, &flows, mix).ok()?;
                 let seen = driven(network, &demand, steps, index as u32);
                 (0 < seen.steps_with_overlaps).then(|| println!("  overlaps: {name} {index} seed {index}"));
                 Some(seen)

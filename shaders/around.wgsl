@@ -145,14 +145,24 @@ fn speed_of_other(env: u32, index: u32) -> f32 {
     return truck[mate_at(env, index)].speed;
 }
 
-// Units that there may be: one of each car, then two of each truck.
-fn n_units_around() -> u32 {
+// Units that there may be: one of each car, then two of each truck, then the trailers of cars.
+fn n_units_around(network: Network) -> u32 {
+    return n_first_units() + select(0u, N_CARS, network.large != 0u);
+}
+
+fn n_first_units() -> u32 {
     return N_CARS + 2u * n_mates();
+}
+
+// Whether a car has the trailer that a unit is, or a unit is no such.
+fn has_unit(env: u32, unit: u32) -> bool {
+    return has_other(env, whose(unit)) && (unit < n_first_units() || has_trailer(car_at(env, whose(unit))));
 }
 
 // Index of the other that has a unit.
 fn whose(unit: u32) -> u32 {
     if unit < N_CARS { return unit; }
+    if n_first_units() <= unit { return unit - n_first_units(); }
     return N_CARS + (unit - N_CARS) / 2u;
 }
 
@@ -165,6 +175,7 @@ fn first_unit(index: u32) -> u32 {
 // The ground that a unit covers.
 fn outline_of_unit(env: u32, network: Network, unit: u32) -> Outline {
     if unit < N_CARS { return outline_of(network, car_at(env, unit)); }
+    if n_first_units() <= unit { return trailer_of(network, car_at(env, whose(unit))); }
     let at = truck[mate_at(env, whose(unit))];
     if (unit - N_CARS) % 2u == 0u { return tractor_outline(at); }
     return trailer_outline(at);
@@ -323,8 +334,8 @@ fn look_beside(env: u32, looking: Looking) {
     var distances = array<f32, N_NEAREST>();
     var units = array<u32, N_NEAREST>();
     for (var rank = 0u; rank < N_NEAREST; rank++) { distances[rank] = NOWHERE; }
-    for (var unit = 0u; unit < n_units_around(); unit++) {
-        if !has_other(env, whose(unit)) { continue; }
+    for (var unit = 0u; unit < n_units_around(looking.network); unit++) {
+        if !has_unit(env, unit) { continue; }
         let outline = outline_of_unit(env, looking.network, unit);
         tractor_room = min(tractor_room, room_between(looking.tractor, outline));
         trailer_room = min(trailer_room, room_between(looking.trailer, outline));
@@ -385,13 +396,4 @@ fn to_corners(outline: Outline, other: Outline) -> f32 {
         distance_squared_to(other, outline.middle - along - across),
     );
     return sqrt(min(ahead, behind));
-}
-
-// Direction at a station of a path: linear between samples.
-fn direction_at(network: Network, path: u32, station: f32) -> vec2<f32> {
-    let along = clamp(station / SPACING, 0.0, f32(path_word(network, path, 1u)) - 1.001);
-    let k = u32(along);
-    let at = network.samples + SAMPLE_WORDS * (path_word(network, path, 0u) + k) + 2u;
-    let before = lanes_vector(at);
-    return normalize(before + (along - f32(k)) * (lanes_vector(at + SAMPLE_WORDS) - before));
 }

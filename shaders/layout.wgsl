@@ -277,6 +277,14 @@ const SPACING_BITS: u32 = 21u;
 const UNIT_BITS: u32 = 4u;
 // Bits of a station of decisions below the unit of pairs.
 const CELL_BITS: u32 = 11u;
+// Bits of a zone's ratio below 1.
+const ZONE_RATIO_BITS: u32 = 12u;
+// Bit of a zone's kind at which its ratio begins.
+const ZONE_RATIO: u32 = 2u;
+// Bits of a length by which stations along a zone are compared below those of decisions.
+const COARSER: u32 = 5u;
+// Bit of a network's first word that says that there are tables of large vehicles.
+const HAS_LARGE: u32 = 2u;
 // Words before the tables of a road.
 const NETWORK_HEAD: u32 = 6u;
 // Words of a path.
@@ -297,10 +305,70 @@ const CROSS: u32 = 1u;
 const SOFT: u32 = 2u;
 // Only a vehicle that may need the lanes beside its own yields.
 const WIDE: u32 = 3u;
+// Bit of a style at which the kind of a large vehicle stands: 0 is a car or a van, 1 a bus, 2 a rigid truck, 3 a
+// tractor-trailer.
+const LARGE: u32 = 8u;
+// Kinds of large vehicles.
+const N_LARGE: u32 = 3u;
+// Classes of vehicles by the room that they need: cars and vans, vehicles of one unit, tractor-trailers.
+const N_CLASSES: u32 = 3u;
+// Length of path that a bus takes: in bends its rear lags behind the path, which is longer than its own way (2^-10
+// m).
+const BUS_LENGTH: i32 = 14336i;
+// The same of a rigid truck (2^-10 m).
+const RIGID_LENGTH: i32 = 12288i;
+// The same of a tractor-trailer (2^-10 m).
+const COMBINATION_LENGTH: i32 = 19577i;
+// Half the width of a bus and of a rigid truck (m).
+const LARGE_HALF_WIDTH: f32 = 1.275f;
+// Half the width of a tractor-trailer (m).
+const COMBINATION_HALF_WIDTH: f32 = 1.25f;
+// Front axle of a bus behind its front (m).
+const BUS_HINGE: f32 = 2.7f;
+// Front axle of a rigid truck behind its front (m).
+const RIGID_HINGE: f32 = 1.4f;
+// Kingpin of a tractor-trailer behind its front (m).
+const COMBINATION_HINGE: f32 = 4.498f;
+// Length of a bus (m).
+const BUS_BODY: f32 = 12.0f;
+// Length of a rigid truck (m).
+const RIGID_BODY: f32 = 10.0f;
+// Front of a trailer ahead of its kingpin (m).
+const TRAILER_AHEAD: f32 = 2.09f;
+// Length of a trailer (m).
+const TRAILER_LENGTH: f32 = 13.71f;
+// Front axle of a tractor behind its front (m).
+const TRACTOR_FRONT_AXLE: f32 = 1.363f;
+// Its drive axle behind its front (m).
+const TRACTOR_DRIVE_AXLE: f32 = 4.906f;
+// Its length (m).
+const TRACTOR_LENGTH: f32 = 5.864f;
+// How much longer a large vehicle waits for a gap than a car does (1/256 step).
+const LAG_OF_LARGE: i32 = 1280i;
+// The largest acceleration of a large vehicle: 1.3 m/s² (2^-19 m a step²).
+const MOST_OF_LARGE: i32 = 6816i;
+// Its speed in a bend, in sixteenths of a car's.
+const PACE_OF_LARGE: i32 = 13i;
+// Words before the tables of large vehicles: how many zones there are.
+const LARGE_HEAD: u32 = 1u;
+// Words of a line and of where crossed lanes are clear behind it.
+const LINE_WORDS: u32 = 2u;
+// Words of the trails of a sample.
+const TRAIL_WORDS: u32 = 6u;
+// Words of the bands of a sample.
+const BAND_WORDS: u32 = 3u;
+// Pairs of classes of which one is of large vehicles.
+const LARGE_PAIRS: u32 = 8u;
+// Units of a trail's direction in 1.
+const TRAIL_UNITS: f32 = 32767.0f;
+// Units of a band in a metre.
+const BAND_UNITS: f32 = 1024.0f;
 // Arrivals: the step is added.
 const ARRIVAL: u32 = 2147483648u;
 // Path and style of a car that enters: 16 times the step and the source are added.
 const ENTERING: u32 = 2684354560u;
+// Kind of the large vehicle that comes next: source, slot and style of the car before it are added.
+const NEXT_LARGE: u32 = 2952790016u;
 // Who of two that stand goes first: the period and both slots are added.
 const COIN: u32 = 3221225472u;
 // Whether one lets another in: the period and both slots are added.
@@ -315,6 +383,8 @@ const COURTESY_PERIOD: u32 = 32u;
 const LAPSE_PERIOD: u32 = 20u;
 // Numbers of slots that differ in a draw.
 const SLOTS: u32 = 64u;
+// Bits of a style in a draw.
+const STYLE_BITS: u32 = 10u;
 // Path of a slot without a car.
 const NO_PATH: u32 = 1023u;
 // Bit of a car's word at which its style begins.
@@ -405,6 +475,9 @@ const MOST_WAITING: u32 = 15u;
 const ENTRY_ROOM: i32 = 3072i;
 // Twice the braking with which it could stop behind the one before it (m/s²).
 const STOPS_WITH: i32 = 3i;
+// Steps of standing beyond the line after which a car is taken away where there may be large vehicles, of which a
+// few can block a full ring for ever.
+const STUCK: u32 = 1200u;
 // Steps between two decisions of a car; slots take turns.
 const DECIDES_EVERY: u32 = 2u;
 // Slots of a row that decide in a step.
@@ -467,6 +540,8 @@ const FROM_STANDING: i32 = 9216i;
 // No part of a car is farther from the sample behind its front, and no corner of a unit from the end of its axis
 // (m).
 const NEAR_CAR: f32 = 12.0f;
+// So much farther those of a large vehicle may be (m).
+const LONGER_THAN_CAR: f32 = 12.0f;
 // Below this speed a car stands, and hits nobody (2^-14 m a step).
 const HITS_NOBODY: i32 = 82i;
 // Added to a contact's code where the truck is at fault: more than there are slots and trucks of a group.

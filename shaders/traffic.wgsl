@@ -65,9 +65,10 @@ fn surround_after_reset(thread: Thread) {
     if has_begun(env) { surround_truck(env); }
 }
 
-// Words of a demand: for each source, for each path, for vans and for rude drivers.
+// Words of a demand: for each source, for each path, for vans, for rude drivers, and for large vehicles if there are
+// some.
 fn demand_words(network: Network) -> u32 {
-    return network.n_sources + network.n_paths + 2u;
+    return network.n_sources + network.n_paths + 2u + select(0u, N_LARGE, network.large != 0u);
 }
 
 // The first word of a level's demand in the table of lanes.
@@ -99,7 +100,7 @@ fn arrive(env: u32) {
     var hindered = 0u;
     for (var slot = 0u; slot < N_CARS; slot++) {
         let car = car_at(env, slot);
-        if is_there(car) && front_of(car) < length_of_path(network, path_of(car)) {
+        if is_there(car) && front_of(car) < length_of_path(network, path_of(car)) && !is_stuck(network, car) {
             let slows = select((hindered_before >> slot) & 1u, marked_slow(car), is_its_turn(env, slot));
             hindered |= slows << slot;
             write_car(env, slot, unmarked(car));
@@ -130,6 +131,37 @@ fn arrive(env: u32) {
     cars[row + HINDERED_AT] = hindered;
 }
 
+// Whether a car stands in a ring that is blocked.
+fn is_stuck(network: Network, car: Car) -> bool {
+    return network.large != 0u && STUCK <= car.what >> STANDING && line_of_car(network, car).x < front_of(car);
+}
+
+// Kind of a large vehicle that comes, in a style; 0 is a car.
+fn large_that_comes(network: Network, kinds: u32, drawn: u32) -> u32 {
+    if network.large == 0u || falls_below(drawn, lanes[kinds]) { return 0u; }
+    for (var kind = 0u; kind < N_LARGE; kind++) {
+        if falls_below(drawn, lanes[kinds + 2u + kind]) { return (kind + 1u) << LARGE; }
+    }
+    return 0u;
+}
+
+// The rear of a car on another lane that is in the way of one that enters, where one of them is large; beyond all roads
+// if it is not.
+fn rear_beside(network: Network, car: Car, other: Car) -> i32 {
+    let classes = class_of(style_of(car)) + class_of(style_of(other));
+    if network.large == 0u || !is_there(other) || classes == 0u { return BEYOND; }
+    let pair = pair_of(network, car, other);
+    let first = lanes[pair.x] & 0xffffu;
+    let rear = front_of(other) - extent(style_of(other));
+    var nearest = BEYOND;
+    for (var z = first; z < first + extractBits(lanes[pair.x], 16u, 8u); z++) {
+        let zone = zone_at(pair.y + ZONE_WORDS * z);
+        if front_of(car) + ENTRY_ROOM < zone.a_in || front_of(other) < zone.b_in || zone.b_out < rear { continue; }
+        nearest = min(nearest, select(zone.a_in, beside(zone, rear), zone.kind == FOLLOW));
+    }
+    return nearest;
+}
+
 // The next car of a source, or none if there is no room for it. `view` is the row's own truck.
 fn entering(env: u32, network: Network, view: View, demand: u32, source: u32) -> Car {
     let random = traffic_words(env, ENTERING + 16u * truck[env].steps + source);
@@ -141,14 +173,35 @@ fn entering(env: u32, network: Network, view: View, demand: u32, source: u32) ->
     let kinds = shares + network.n_paths;
     let van = select(0u, VAN, falls_below(random.y, lanes[kinds]));
     let rude = select(0u, RUDE, falls_below(random.z, lanes[kinds + 1u]));
-    let style = (random.y & (VAN - 1u)) | van | rude;
-    let front = extent(style);
-    var rear = BEYOND;
-    var pace = 0;
+    let of_car = (random.y & (VAN - 1u)) | van | rude;
+    var before = no_car();
+    var slot_before = 0u;
+    var rear_before = BEYOND;
     for (var slot = 0u; slot < N_CARS; slot++) {
         let other = car_at(env, slot);
         let other_rear = front_of(other) - extent(style_of(other));
-        if is_there(other) && first <= path_of(other) && path_of(other) < end && other_rear < rear {
+        if is_there(other) && first <= path_of(other) && path_of(other) < end && other_rear < rear_before {
+            before = other;
+            slot_before = slot;
+            rear_before = other_rear;
+        }
+    }
+    // The same while it waits for room, so that none that takes more of it gives way to one that takes less.
+    var drawn = random.y;
+    if network.large != 0u && is_there(before) {
+        let place = (source * SLOTS + slot_before) << STYLE_BITS;
+        drawn = traffic_words(env, NEXT_LARGE + place + style_of(before)).x;
+    }
+    let of_large = of_car | large_that_comes(network, kinds, drawn);
+    let style = select(of_car, of_large, fits(network, path, of_large));
+    let front = extent(style);
+    let enters = Car(front << FINER_STATION, 0, path | (style << STYLE), 0);
+    var rear = rear_before;
+    var pace = pace_of(before);
+    for (var slot = 0u; slot < N_CARS; slot++) {
+        let other = car_at(env, slot);
+        let other_rear = rear_beside(network, enters, other);
+        if other_rear < rear {
             rear = other_rear;
             pace = pace_of(other);
         }
@@ -159,7 +212,7 @@ fn entering(env: u32, network: Network, view: View, demand: u32, source: u32) ->
         if !is_driving(mate) { continue; }
         var seen = view;
         if mate != env { seen = view_of(mate, network); }
-        let ahead = truck_ahead(network, seen, Car(station, 0, path | (style << STYLE), 0));
+        let ahead = truck_ahead(network, seen, enters);
         if ahead.x < rear {
             rear = ahead.x;
             pace = ahead.y;
@@ -216,13 +269,12 @@ fn clear_around(env: u32, network: Network, mate: u32) {
     for (var slot = 0u; slot < N_CARS; slot++) {
         let car = car_at(env, slot);
         if !is_there(car) { continue; }
-        let outline = outline_of(network, car);
         // A truck could not stop behind it.
         let room = station_of(car) - length_of(car) - front;
         let stops = max((at.speed * at.speed - speed_of(car) * speed_of(car)) / STOPS_BEHIND_WITH, 0.0);
         let comes_from_there = path_word(network, path_of(car), 5u) == source;
         let is_too_near_ahead = comes_from_there && 0.0 <= room && room < ROOM_ALONG + stops;
-        if is_too_near_ahead || are_overlapping(tractor, outline) || are_overlapping(trailer, outline) {
+        if is_too_near_ahead || is_covering(network, car, tractor, trailer) {
             write_car(env, slot, no_car());
         }
     }
@@ -269,9 +321,10 @@ fn truck_ahead(network: Network, view: View, car: Car) -> vec2<i32> {
         && view.station < 0 && -COMING - two_seconds <= view.station;
     if is_coming { return vec2<i32>(0, view.speed); }
     if is_far_from(view, sample_position(network, car, sample_behind(network, car))) { return vec2<i32>(BEYOND, 0); }
-    let room = half_width_of(car) + CORRIDOR_ROOM;
     for (var k = 0u; k < min(path_word(network, path, 1u), CORRIDOR_SAMPLES); k++) {
-        if squared_to_now(view, sample_position(network, car, k)) < room * room {
+        let swept = corridor_at(network, car, k);
+        let room = swept.half_width + CORRIDOR_ROOM;
+        if squared_to_now(view, swept.point) < room * room {
             return vec2<i32>(in_lengths(f32(k) * SPACING - BEFORE_SAMPLE), speed_along(view, network, car, k));
         }
     }

@@ -18,6 +18,7 @@ pub mod demand; // how many cars want to go where
 mod drivers; // other kinds of drivers
 pub mod hcm; // the Highway Capacity Manual's equations
 mod kept; // tables from the cache
+mod large; // buses and trucks
 mod meetings; // where two lines are near each other
 mod model; // the intelligent driver model in integers
 mod network; // the tables
@@ -40,6 +41,7 @@ pub use clock::Clock;
 pub use decide::Driver;
 pub use demand::{Demand, Mix};
 pub use drivers::Drivers;
+pub use large::{Large, LargeTables};
 pub use network::{Kind, Network, Pair, Path, SPACING, Sample, Source, Stretch, Zone};
 pub use others::{Nobody, Others};
 pub use paths::{begins, speed_limit};
@@ -60,6 +62,8 @@ pub(crate) fn printed_constants() -> String {
         model::printed_constants(),
         rules::printed_constants(),
         network::printed_constants(),
+        large::printed_constants(),
+        large::printed_tables(),
         clock::printed_constants(),
         car::printed_constants(),
         decide::printed_constants(),

@@ -9,6 +9,7 @@ mod tests;
 
 use std::path::{Path, PathBuf};
 
+use offtrack::files::cache::Loading;
 use offtrack::files::reader::shown;
 use offtrack::map::Road;
 use offtrack::map::chosen::is_map;
@@ -38,7 +39,8 @@ pub struct Args {
     /// there are a tenth; or of arms and from arm to arm, N=400,E-W=120, and no others.
     #[arg(long, default_value = "1500")]
     demand: String,
-    /// Fraction of the cars that are of a kind: vans=0.25, 7 m long; rude=0.1, whose drivers let nobody in; repeatable.
+    /// Fraction of the cars that are of a kind: vans=0.25, 7 m long; buses=0.02, rigid_trucks=0.05 and
+    /// tractor_trailers=0.03; rude=0.1, whose drivers let nobody in; repeatable.
     #[arg(long, value_name = "KIND=FRACTION")]
     share: Vec<String>,
     /// Time that is counted of each run, after two minutes in which the road fills (min).
@@ -75,7 +77,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     if !args.roads.iter().any(|name| is_map(Path::new(name))) {
         args.place.check_absent()?;
     }
-    let places = roads.into_iter().map(Place::new).collect::<Result<Vec<Place>, Error>>()?;
+    let places = roads.into_iter().map(|road| Place::new(road, mix)).collect::<Result<Vec<Place>, Error>>()?;
     if args.capacity { capacity::run(args, &places, mix) } else { service::run(args, &places, mix) }
 }
 
@@ -86,11 +88,9 @@ struct Place {
 }
 
 impl Place {
-    fn new(road: Road) -> Result<Place, Error> {
-        let network = roads::loading("baking", |loading| match loading.cache {
-            Some(cache) => Network::cached(&road, cache),
-            None => Network::bake(&road),
-        });
+    fn new(road: Road, mix: Mix) -> Result<Place, Error> {
+        let bake = |loading: &Loading| Network::cached(&road, mix.has_large(), loading.cache);
+        let network = roads::loading("baking", bake);
         let network = network.map_err(|error| setting("ROAD", &road.name, &error.to_string()))?;
         Ok(Place { road, network })
     }
@@ -135,12 +135,22 @@ fn mix(shares: &[String]) -> Result<Mix, Error> {
         let fraction = match parsed {
             Some(("vans", fraction)) => Some((&mut mix.vans, fraction)),
             Some(("rude", fraction)) => Some((&mut mix.rude, fraction)),
+            Some(("buses", fraction)) => Some((&mut mix.large[0], fraction)),
+            Some(("rigid_trucks", fraction)) => Some((&mut mix.large[1], fraction)),
+            Some(("tractor_trailers", fraction)) => Some((&mut mix.large[2], fraction)),
             _ => None,
         };
         match fraction.filter(|(_, fraction)| (0.0..=1.0).contains(fraction)) {
             Some((of, fraction)) => *of = fraction,
-            None => return Err(setting("--share", share, "must be vans=F or rude=F with F in 0..1")),
+            None => {
+                let expected = "must be vans=F, buses=F, rigid_trucks=F, tractor_trailers=F or rude=F with F in 0..1";
+                return Err(setting("--share", share, expected));
+            }
         }
+    }
+    let all = mix.vans + mix.large.iter().sum::<f32>();
+    if 1.0 < all {
+        return Err(setting("--share", &shares.join(" "), "vans, buses and trucks must be at most 1 together"));
     }
     Ok(mix)
 }

@@ -88,18 +88,20 @@ impl Among {
         let met = Contact::from_code(row.met);
         self.standing += if truck.speed < STANDS { step } else { 0.0 };
         for (slot, car) in row.cars.iter().enumerate().filter(|(_, car)| car.is_there()) {
-            let outline = car.outline(network);
+            let outlines = car.outlines(network);
             let (has_entered, hindered) = (has_entered(network, car), row.hindered >> slot & 1 == 1);
             if met.is_some_and(|contact| contact.slot == slot) {
-                self.met = Some(Met { by_tractor: units[0].overlaps(&outline), has_entered });
+                self.met = Some(Met { by_tractor: outlines.clone().any(|its| units[0].overlaps(&its)), has_entered });
             }
             if hindered && has_entered {
                 self.blocked = self.blocked.max(f64::from(car.standing()) * step);
             }
             self.braking += if hindered && car.acceleration() < -HARD && DRIVES < car.speed() { step } else { 0.0 };
-            let is_beside = has_entered && row.entered != 0 && units.iter().any(|unit| is_beside(unit, &outline));
+            let is_any_beside = outlines.clone().any(|its| units.iter().any(|unit| is_beside(unit, &its)));
+            let is_beside = has_entered && row.entered != 0 && is_any_beside;
             self.beside += if is_beside { step } else { 0.0 };
-            if STANDS < truck.speed && 0.0 < (outline.middle - truck.position).dot(units[0].along) {
+            let is_ahead = |its: &Outline| 0.0 < (its.middle - truck.position).dot(units[0].along);
+            for outline in outlines.filter(|its| STANDS < truck.speed && is_ahead(its)) {
                 self.look_ahead(&units, truck.speed, &outline, car.speed());
             }
         }

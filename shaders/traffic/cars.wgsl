@@ -77,8 +77,24 @@ fn in_metres(length: i32) -> f32 {
     return f32(length) * (1.0 / METRE);
 }
 
-// Length of a car of a style (2^-10 m).
+// Which large vehicle has a style: 0 is a car or a van, 1 a bus, 2 a rigid truck, 3 a tractor-trailer.
+fn large_of(style: u32) -> u32 {
+    return (style >> LARGE) & N_LARGE;
+}
+
+// The class of a style by the room that its vehicle needs.
+fn class_of(style: u32) -> u32 {
+    return (large_of(style) + 1u) / 2u;
+}
+
+// Length of path that a vehicle of a style takes (2^-10 m).
 fn extent(style: u32) -> i32 {
+    switch large_of(style) {
+        case 1u: { return BUS_LENGTH; }
+        case 2u: { return RIGID_LENGTH; }
+        case 3u: { return COMBINATION_LENGTH; }
+        default: {}
+    }
     return select(SHORTEST + LONGER * i32((style >> LENGTH) & 3u), VAN_LENGTH, (style & VAN) == VAN);
 }
 
@@ -99,6 +115,8 @@ fn speed_of(car: Car) -> f32 {
 
 // Half the width of a car (m).
 fn half_width_of(car: Car) -> f32 {
+    let large = large_of(style_of(car));
+    if large != 0u { return select(LARGE_HALF_WIDTH, COMBINATION_HALF_WIDTH, large == 3u); }
     return select(HALF_WIDTH, VAN_HALF_WIDTH, is_van(car));
 }
 
@@ -132,6 +150,8 @@ struct Network {
     pairs: u32,
     zones: u32,
     sources: u32,
+    // 0 where there are no tables of large vehicles.
+    large: u32,
     levels: u32,
 }
 
@@ -155,7 +175,47 @@ fn network_of(route: u32) -> Network {
     let pairs = samples + SAMPLE_WORDS * lanes[at + 2u];
     let zones = pairs + PAIR_WORDS * n_paths * n_paths;
     let sources = zones + ZONE_WORDS * lanes[at + 3u];
-    return Network(n_paths, n_sources, paths, samples, pairs, zones, sources, sources + SOURCE_WORDS * n_sources);
+    let end = sources + SOURCE_WORDS * n_sources;
+    let has_large = (lanes[at] & HAS_LARGE) == HAS_LARGE;
+    let large = select(0u, end + LARGE_HEAD, has_large);
+    var levels = end;
+    if has_large {
+        let of_samples = (TRAIL_WORDS + BAND_WORDS) * lanes[at + 2u];
+        let of_paths = (LINE_WORDS + 1u) * N_CLASSES * n_paths + LARGE_PAIRS * PAIR_WORDS * n_paths * n_paths;
+        levels = large + of_paths + of_samples + ZONE_WORDS * lanes[end];
+    }
+    return Network(n_paths, n_sources, paths, samples, pairs, zones, sources, large, levels);
+}
+
+// Samples of all paths.
+fn samples_of(network: Network) -> u32 {
+    return (network.pairs - network.samples) / SAMPLE_WORDS;
+}
+
+// Station of the line of a car, and where it is clear of the lanes that it crosses on its way in (2^-10 m).
+fn line_of_car(network: Network, car: Car) -> vec2<i32> {
+    let path = path_of(car);
+    var at = network.paths + PATH_WORDS * path + 3u;
+    if network.large != 0u { at = network.large + LINE_WORDS * (class_of(style_of(car)) * network.n_paths + path); }
+    return vec2<i32>(bitcast<i32>(lanes[at]), bitcast<i32>(lanes[at + 1u]));
+}
+
+// Whether a vehicle can take a path without the lanes of those who come the other way.
+fn fits(network: Network, path: u32, style: u32) -> bool {
+    if network.large == 0u { return true; }
+    let flags = network.large + LINE_WORDS * N_CLASSES * network.n_paths;
+    return lanes[flags + class_of(style) * network.n_paths + path] == 1u;
+}
+
+// First words of the ordered pair of paths that two cars drive, and of the table of its zones.
+fn pair_of(network: Network, one: Car, other: Car) -> vec2<u32> {
+    let n = network.n_paths;
+    let pair = PAIR_WORDS * (path_of(one) * n + path_of(other));
+    let classes = class_of(style_of(one)) * N_CLASSES + class_of(style_of(other));
+    if network.large == 0u || classes == 0u { return vec2<u32>(network.pairs + pair, network.zones); }
+    let pairs = bands_of(network) + BAND_WORDS * samples_of(network);
+    let zones = pairs + LARGE_PAIRS * PAIR_WORDS * n * n;
+    return vec2<u32>(pairs + PAIR_WORDS * (classes - 1u) * n * n + pair, zones);
 }
 
 // Words of a path's row.
@@ -189,6 +249,8 @@ struct Zone {
     b_in: i32,
     b_out: i32,
     delta: i32,
+    // How far a station on a goes less than a metre for each metre on b, within the zone (2^-12).
+    slower: i32,
     kind: u32,
 }
 
@@ -202,8 +264,15 @@ fn zone_at(at: u32) -> Zone {
         i32((b & 0xffffu) << UNIT_BITS),
         i32((b >> 16u) << UNIT_BITS),
         extractBits(bitcast<i32>(rest), 0u, 16u) << UNIT_BITS,
+        bitcast<i32>(rest) >> (16u + ZONE_RATIO),
         (rest >> 16u) & 3u,
     );
+}
+
+// The station on a that is beside one on b (2^-10 m).
+fn beside(zone: Zone, station: i32) -> i32 {
+    let within = clamp(station, zone.b_in, zone.b_out) - zone.b_in;
+    return station - zone.delta - (((within >> 2u) * zone.slower) >> (ZONE_RATIO_BITS - 2u));
 }
 
 // The zones of an ordered pair of paths, those for a truck alone among them: the first, and how many.
@@ -236,13 +305,23 @@ struct Outline {
     half_width: f32,
 }
 
-// The ground that a car covers: both axles are on the path.
+// The ground that a car covers, whose axles are both on the path, or a bus, a rigid truck or a tractor.
 fn outline_of(network: Network, car: Car) -> Outline {
+    if large_of(style_of(car)) != 0u { return first_of_large(network, car); }
     let length = length_of(car);
     let station = station_of(car);
     let front = point_at(network, path_of(car), station - OVERHANG * length);
     let rear = point_at(network, path_of(car), station - (1.0 - OVERHANG) * length);
     return Outline(0.5 * (front + rear), normalize(front - rear), 0.5 * length, half_width_of(car));
+}
+
+// Direction at a station of a path: linear between samples.
+fn direction_at(network: Network, path: u32, station: f32) -> vec2<f32> {
+    let along = clamp(station / SPACING, 0.0, f32(path_word(network, path, 1u)) - 1.001);
+    let k = u32(along);
+    let at = network.samples + SAMPLE_WORDS * (path_word(network, path, 0u) + k) + 2u;
+    let before = lanes_vector(at);
+    return normalize(before + (along - f32(k)) * (lanes_vector(at + SAMPLE_WORDS) - before));
 }
 
 // The ground that a unit covers.

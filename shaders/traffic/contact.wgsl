@@ -14,10 +14,10 @@ fn touched(env: u32, network: Network) -> u32 {
         let car = car_at(env, slot);
         if !is_there(car) { continue; }
         let between = sample_position(network, car, sample_behind(network, car)) - middle;
-        if reach * reach <= dot(between, between) { continue; }
-        let outline = outline_of(network, car);
-        if !are_overlapping(tractor, outline) && !are_overlapping(trailer, outline) { continue; }
-        if !is_cars_fault(env, network, tractor, trailer, car, outline) { return slot + 1u + TRUCKS_FAULT; }
+        let its_reach = reach + select(0.0, LONGER_THAN_CAR, large_of(style_of(car)) != 0u);
+        if its_reach * its_reach <= dot(between, between) { continue; }
+        if !is_covering(network, car, tractor, trailer) { continue; }
+        if !is_cars_fault(env, network, tractor, trailer, car) { return slot + 1u + TRUCKS_FAULT; }
         if found == 0u { found = slot + 1u; }
     }
     let first = first_of_group(env);
@@ -60,17 +60,17 @@ fn has_entered_lately(env: u32, entered: u32) -> bool {
 }
 
 // Whether the car is at fault of a contact with a truck whose units cover this ground.
-fn is_cars_fault(env: u32, network: Network, tractor: Outline, trailer: Outline, car: Car, outline: Outline) -> bool {
+fn is_cars_fault(env: u32, network: Network, tractor: Outline, trailer: Outline, car: Car) -> bool {
     let entered = entered_in(env);
     if pace_of(car) <= HITS_NOBODY || has_entered_lately(env, entered) { return false; }
     let arm = arm_of(network, path_of_route(truck[env].route));
-    let behind_line = front_of(car) - line_of_path(network, path_of(car));
+    let behind_line = front_of(car) - line_of_car(network, car).x;
     // 2^-14 m a step for some steps.
     let lately = max(FROM_STANDING, (i32(LATELY) * pace_of(car)) >> 4u);
     let is_behind = 1 <= behind_line && behind_line <= lately;
     if entered != 0u && arm_of(network, path_of(car)) != arm && is_behind { return true; }
     let before = units_before(env, tractor, trailer);
-    return are_overlapping(before.tractor, outline) || are_overlapping(before.trailer, outline);
+    return is_covering(network, car, before.tractor, before.trailer);
 }
 
 // Index of the arm that a path comes from.

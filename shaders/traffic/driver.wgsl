@@ -54,7 +54,7 @@ struct SeenCar {
 }
 
 fn seen_car(network: Network, slot: u32, car: Car) -> SeenCar {
-    let line = line_of_path(network, path_of(car));
+    let line = line_of_car(network, car).x;
     let station = front_of(car);
     let square = square_of(pace_of(car));
     return SeenCar(
@@ -76,6 +76,8 @@ struct Driver {
     network: Network,
     me: SeenCar,
     path: u32,
+    // Its state, of which the path and the style stay.
+    car: Car,
     temperament: i32,
     // Its time headway (1/256 step).
     headway: i32,
@@ -101,13 +103,15 @@ fn decided(env: u32, slot: u32, car: Car) -> u32 {
     let path = path_of(car);
     let me = seen_car(network, slot, car);
     let headway = rule(RULE_HEADWAY) * (TIME_PARTS - temperament) / TIME_PARTS;
-    var driver = Driver(env, network, me, path, temperament, headway, 0, false, BEYOND, 0);
+    let is_large = large_of(style_of(car)) != 0u;
+    var driver = Driver(env, network, me, path, car, temperament, headway, 0, false, BEYOND, 0);
     let ahead = pair_cell(me.station + SIGHT);
     let behind = pair_cell(me.station - me.length - BEHIND);
     for (var k = 0u; k < N_CARS; k++) {
         let other = undecided_at(env, k);
         if k == slot || !is_there(other) { continue; }
-        let at = network.pairs + PAIR_WORDS * (path * network.n_paths + path_of(other));
+        let pair = pair_of(network, car, other);
+        let at = pair.x;
         let ends = lanes[at + 1u];
         let front = pair_cell(front_of(other) + SIGHT_OF_OTHERS);
         let rear = pair_cell(front_of(other) - extent(style_of(other)) - BEHIND);
@@ -118,28 +122,29 @@ fn decided(env: u32, slot: u32, car: Car) -> u32 {
         let first = lanes[at] & 0xffffu;
         let n = extractBits(lanes[at], 16u, 8u);
         for (var z = 0u; z < n; z++) {
-            consider(&driver, zone_at(network.zones + ZONE_WORDS * (first + z)), weighed);
+            consider(&driver, zone_at(pair.y + ZONE_WORDS * (first + z)), weighed);
         }
     }
-    // The same car, if this truck were not there.
-    var without = driver;
+    // The row's own truck is the last: what is minded before is minded without it too.
+    var without = 0;
     let first = first_of_group(env);
-    for (var mate = first; mate < first + batch.group; mate++) {
+    for (var n = 1u; n <= batch.group; n++) {
+        let mate = first + (env - first + n) % batch.group;
+        if mate == env { without = driver.interaction; }
         if !is_driving(mate) { continue; }
         let view = view_of(mate, network);
         mind_at_line(&driver, view);
         mind_in_corridor(&driver, view, car);
-        if mate == env { continue; }
-        mind_at_line(&without, view);
-        mind_in_corridor(&without, view, car);
     }
-    let slows_for_truck = without.interaction < driver.interaction;
+    let slows_for_truck = without < driver.interaction;
     keep_crossed_lanes_clear(&driver);
     if me.waits && driver.stops { stop_before(&driver, me.line - me.station); }
     // Half a step ahead: a speed's unit is the way of half a step.
-    let limit = limit_at(network, path, car.station + car.speed);
+    let at_car = limit_at(network, path, car.station + car.speed);
+    let limit = select(at_car, (at_car * PACE_OF_LARGE) >> 4u, is_large);
     let wished = max(limit, LEAST_WISHED) * (SPEED_PARTS + temperament) / SPEED_PARTS;
-    let acceleration = acceleration_of(me.speed, wished, driver.interaction);
+    let wanted = acceleration_of(me.speed, wished, driver.interaction);
+    let acceleration = select(wanted, min(wanted, MOST_OF_LARGE), is_large);
     let holds = LOOKS_UP <= acceleration && looks_away(env, slot);
     return marked(select(acceleration, min(car.acceleration, 0), holds), slows_for_truck);
 }
@@ -176,7 +181,7 @@ fn consider(driver: ptr<function, Driver>, zone: Zone, other: SeenCar) {
         }
     } else if it_is_inside {
         if zone.kind == FOLLOW {
-            let gap = other.station - zone.delta - other.length - me.station;
+            let gap = beside(zone, other.station - other.length) - me.station;
             stop_or_follow(driver, zone.a_in - me.station, gap, other.speed);
         } else {
             stop_before(driver, zone.a_in - me.station);
@@ -189,12 +194,23 @@ fn consider(driver: ptr<function, Driver>, zone: Zone, other: SeenCar) {
 // Both are where paths run together: who is ahead leads.
 fn follow_inside(driver: ptr<function, Driver>, zone: Zone, other: SeenCar) {
     let me = (*driver).me;
-    let ahead = other.station - zone.delta;
-    if me.station < ahead || (ahead == me.station && other.slot < me.slot) {
-        let rear = ahead - other.length;
+    if is_ahead(zone, me.station, other.station, other.slot < me.slot) {
+        let rear = beside(zone, other.station - other.length);
         heed(driver, interaction_behind(*driver, rear - me.station, other.speed));
         note_leader(driver, rear, other.speed);
     }
+}
+
+// Whether a vehicle on b, with its front at a station, is ahead of one on a; both find the same (2^-10 m).
+fn is_ahead(zone: Zone, own: i32, its: i32, its_slot_is_lower: bool) -> bool {
+    var mine = own;
+    var other = its - zone.delta;
+    if zone.slower != 0 {
+        // By the parts of the zone that they have driven: what both find is alike to the last bit.
+        mine = ((own - zone.a_in) >> COARSER) * ((zone.b_out - zone.b_in) >> COARSER);
+        other = ((its - zone.b_in) >> COARSER) * ((zone.a_out - zone.a_in) >> COARSER);
+    }
+    return mine < other || (mine == other && its_slot_is_lower);
 }
 
 // Both have the zone before them, and it is not that of this car's entry.
@@ -294,7 +310,7 @@ fn consider_at_line(driver: ptr<function, Driver>, zone: Zone, other: SeenCar) {
         let left = max(zone.b_out + other.length - other.station, 0);
         if to_line + GONE_BEFORE < time_of(left, max(other.speed, LEAST_CROSSING)) { (*driver).stops = true; }
     } else if zone.kind == FOLLOW {
-        let rear = other.station - zone.delta - other.length;
+        let rear = beside(zone, other.station - other.length);
         // It foresees how far one that passes moves away in a second.
         let soon = rear - me.station + ((10 * max(other.speed - me.speed, 0)) >> 4u);
         stop_or_follow(driver, me.line - me.station, soon, other.speed);
@@ -305,10 +321,11 @@ fn consider_at_line(driver: ptr<function, Driver>, zone: Zone, other: SeenCar) {
 // Time that this car leaves between itself and ring traffic that comes (1/256 step).
 fn lag_of(driver: Driver, kind: u32) -> i32 {
     let network = driver.network;
-    let crosses = 0 < bitcast<i32>(path_word(network, driver.path, 4u));
+    let crosses = 0 < line_of_car(network, driver.car).y;
     let source = path_word(network, driver.path, 5u);
     let lane = min(lanes[network.sources + SOURCE_WORDS * source + 1u], 1u);
-    let lag = rule(select(RULE_LAGS + u32(crosses), RULE_SOFT_LAGS + lane, kind == SOFT));
+    let of_cars = rule(select(RULE_LAGS + u32(crosses), RULE_SOFT_LAGS + lane, kind == SOFT));
+    let lag = of_cars + select(0, LAG_OF_LARGE, large_of(style_of(driver.car)) != 0u);
     let patience = max(IMPATIENCE - i32(driver.me.standing), LEAST_PATIENCE);
     return lag * (TIME_PARTS - driver.temperament) * patience / (TIME_PARTS * IMPATIENCE);
 }
@@ -325,7 +342,7 @@ fn lets_in(env: u32, inside: SeenCar, distance: i32, waiting: SeenCar) -> bool {
 fn keep_crossed_lanes_clear(driver: ptr<function, Driver>) {
     let me = (*driver).me;
     let rear = (*driver).leader_rear;
-    let clear = bitcast<i32>(path_word((*driver).network, (*driver).path, 4u));
+    let clear = line_of_car((*driver).network, (*driver).car).y;
     let would_block = rear - rule(RULE_GAP) - me.length < clear && me.line < rear;
     if me.waits && would_block && (*driver).leader_speed < SLOW { (*driver).stops = true; }
 }

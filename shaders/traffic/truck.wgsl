@@ -135,7 +135,7 @@ fn is_in_the_way(driver: Driver, view: View, zone: Zone) -> bool {
         return to_line + GONE_BEFORE < time_of(max(zone.b_out - rear, 0), max(view.speed, LEAST_CROSSING));
     }
     // Once its rear has passed, it is followed as what is in the corridor.
-    return rear - zone.delta < zone.a_in;
+    return beside(zone, rear) < zone.a_in;
 }
 
 // Takes the ground that a truck covers into account: a car follows what is in its corridor, slows for what will be, and
@@ -147,12 +147,12 @@ fn mind_in_corridor(driver: ptr<function, Driver>, view: View, car: Car) {
     let at_front = sample_position(network, car, first);
     if is_far_from(view, at_front) { return; }
     let n = min(path_word(network, path_of(car), 1u) - first, CORRIDOR_SAMPLES);
-    let half_width = half_width_of(car);
     var leader = n;
     for (var k = 0u; k < n && leader == n; k++) {
         let is_beside_front = f32(first + k) * SPACING < station_of(car);
-        let room = half_width + select(CORRIDOR_ROOM, ROOM_AT_FRONT, is_beside_front);
-        if squared_to_now(view, sample_position(network, car, first + k)) < room * room { leader = k; }
+        let swept = corridor_at(network, car, first + k);
+        let room = swept.half_width + select(CORRIDOR_ROOM, ROOM_AT_FRONT, is_beside_front);
+        if squared_to_now(view, swept.point) < room * room { leader = k; }
     }
     if leader < n {
         let rear = in_lengths(f32(first + leader) * SPACING - BEFORE_SAMPLE);
@@ -166,9 +166,10 @@ fn mind_in_corridor(driver: ptr<function, Driver>, view: View, car: Car) {
         note_leader(driver, rear, speed);
     }
     if !view.waits && !me.is_rude {
-        let room = half_width + ROOM_LATER;
         for (var k = 0u; k < leader; k++) {
-            let point = sample_position(network, car, first + k);
+            let swept = corridor_at(network, car, first + k);
+            let point = swept.point;
+            let room = swept.half_width + ROOM_LATER;
             var squared = distance_squared_to(view.later[0], point);
             for (var unit = 1u; unit < 4u; unit++) {
                 squared = min(squared, distance_squared_to(view.later[unit], point));
@@ -180,6 +181,20 @@ fn mind_in_corridor(driver: ptr<function, Driver>, view: View, car: Car) {
         }
     }
     if touches_soon(view, network, car, at_front) { heed(driver, BRAKES_HARDEST); }
+}
+
+// What a car needs of its corridor at a sample: a point in its middle, and half its width (m).
+struct Swept {
+    point: vec2<f32>,
+    half_width: f32,
+}
+
+fn corridor_at(network: Network, car: Car, sample: u32) -> Swept {
+    let point = sample_position(network, car, sample);
+    if large_of(style_of(car)) == 0u { return Swept(point, half_width_of(car)); }
+    let band = band_at(network, car, sample);
+    let at = network.samples + SAMPLE_WORDS * (path_word(network, path_of(car), 0u) + sample);
+    return Swept(point + band.x * perpendicular(lanes_vector(at + 2u)), band.y);
 }
 
 // Slows for a truck that will be at a station of the car's path, or waits (2^-10 m).
@@ -194,12 +209,13 @@ fn slow_for(driver: ptr<function, Driver>, view: View, rear: i32) {
 
 // Whether a car is about to touch a truck, with its front near a point.
 fn touches_soon(view: View, network: Network, car: Car, front: vec2<f32>) -> bool {
-    if NEAR_UNIT * NEAR_UNIT <= squared_to_now(view, front) { return false; }
+    let near = NEAR_UNIT + select(0.0, LONGER_THAN_CAR, large_of(style_of(car)) != 0u);
+    if near * near <= squared_to_now(view, front) { return false; }
     // A station's unit is half of a speed's way in a step.
     let ahead = Car(car.station + 2 * CAR_STEPS_AHEAD * car.speed + MORE_AHEAD, car.speed, car.what, 0);
-    let soon = outline_of(network, ahead);
-    return are_overlapping(soon, grown_by(view.tractor, LEAST_ROOM, LEAST_ROOM))
-        || are_overlapping(soon, grown_by(view.trailer, LEAST_ROOM, LEAST_ROOM));
+    let tractor = grown_by(view.tractor, LEAST_ROOM, LEAST_ROOM);
+    let trailer = grown_by(view.trailer, LEAST_ROOM, LEAST_ROOM);
+    return is_covering(network, ahead, tractor, trailer);
 }
 
 // The ground that a unit covers, and the room before, behind and beside it.

@@ -15,7 +15,9 @@ pub fn layout() -> String {
 /// What shaders of a picture know of a batch: constants, structs, tables and columns by the bindings that they have in
 /// a step, to be read alone, and the functions that a step's shaders share, of other vehicles too.
 pub fn picture() -> String {
-    let common = SHADERS.iter().filter(|(name, _)| name.starts_with("common/") || *name == "traffic/cars");
+    let common = SHADERS
+        .iter()
+        .filter(|(name, _)| name.starts_with("common/") || ["traffic/cars", "traffic/large"].contains(name));
     [shared(), buffers::printed_to_read()].into_iter().chain(common.map(|(_, text)| format!("\n{text}"))).collect()
 }
 

@@ -140,6 +140,12 @@ pub(super) struct WrittenTraffic {
     #[serde(default)]
     pub(super) vans: f64,
     #[serde(default)]
+    pub(super) buses: f64,
+    #[serde(default)]
+    pub(super) rigid_trucks: f64,
+    #[serde(default)]
+    pub(super) tractor_trailers: f64,
+    #[serde(default)]
     pub(super) rude: Option<WrittenRange>,
     pub(super) courtesy: Option<f64>,
     #[serde(default = "waiting")]

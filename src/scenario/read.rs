@@ -173,13 +173,21 @@ fn observes_vehicles(reader: &Reader, written: &Written) -> Result<bool, Error> 
 
 /// Checks `[traffic]`.
 fn of_traffic(reader: &Reader, written: &WrittenTraffic) -> Result<Traffic, Error> {
-    let WrittenTraffic { demand, drivers, vans, rude, courtesy, waiting, hindrance, group } = written;
+    let WrittenTraffic { demand, drivers, vans, rude, courtesy, waiting, hindrance, group, .. } = written;
+    let vans = reader.within("traffic.vans", *vans, 0.0..=1.0, "")?;
+    let mut large = [written.buses, written.rigid_trucks, written.tractor_trailers];
+    for (key, fraction) in traffic::LARGE_KEYS.into_iter().zip(&mut large) {
+        *fraction = reader.within(&format!("traffic.{key}"), *fraction, 0.0..=1.0, "")?;
+    }
+    let all = vans + large.iter().sum::<f64>();
+    reader.within("traffic.vans and larger vehicles together", all, 0.0..=1.0, "")?;
     let [least, greatest] = traffic::MOST_HINDRANCE;
     let rude = rude.as_ref().map(|written| range(reader, "traffic.rude", written, 1.0, ""));
     Ok(Traffic {
         demand: numbers(reader, "traffic.demand", demand, traffic::MOST_DEMAND, 0.0, "veh/h")?,
         drivers: *drivers,
-        vans: reader.within("traffic.vans", *vans, 0.0..=1.0, "")?,
+        vans,
+        large,
         rude: rude.transpose()?.unwrap_or_default(),
         courtesy: reader.within("traffic.courtesy", courtesy.unwrap_or(drivers.courtesy()), 0.0..=1.0, "")?,
         waiting: reader.within("traffic.waiting", *waiting, 0.0..=600.0, "s")?,

@@ -10,6 +10,9 @@ pub(super) const MOST_DEMAND: f64 = 3000.0;
 /// Range of the weight of hindrance.
 pub(super) const MOST_HINDRANCE: [f64; 2] = [-1e6, 1e6];
 
+/// Keys of the fractions of large vehicles.
+pub(super) const LARGE_KEYS: [&str; 3] = ["buses", "rigid_trucks", "tractor_trailers"];
+
 /// Other vehicles on the roads.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Traffic {
@@ -19,6 +22,8 @@ pub struct Traffic {
     pub drivers: Drivers,
     /// Fraction of vans, 7 m long.
     pub vans: f64,
+    /// Fractions of buses, rigid trucks and tractor-trailers.
+    pub large: [f64; 3],
     /// Least and greatest fraction of rude drivers, who let nobody in and do not yield to a truck that needs the lanes
     /// beside its own; drawn for each episode.
     pub rude: [f64; 2],
@@ -37,11 +42,12 @@ impl Traffic {
     pub(super) fn check(&self) -> Result<(), Invalid> {
         list("traffic.demand", &self.demand, [0.0, MOST_DEMAND])?;
         let [least, greatest] = self.rude;
-        for (key, value) in
-            [("vans", self.vans), ("rude[0]", least), ("rude[1]", greatest), ("courtesy", self.courtesy)]
-        {
+        let shares = [("vans", self.vans)].into_iter().chain(LARGE_KEYS.into_iter().zip(self.large));
+        let drivers = [("rude[0]", least), ("rude[1]", greatest), ("courtesy", self.courtesy)];
+        for (key, value) in shares.chain(drivers) {
             within(&format!("traffic.{key}"), value, [0.0, 1.0])?;
         }
+        within("traffic.vans and larger vehicles together", self.vans + self.large.iter().sum::<f64>(), [0.0, 1.0])?;
         within("traffic.rude[1]", greatest, [least, 1.0])?;
         within("traffic.waiting", self.waiting, [0.0, 1e6])?;
         within("traffic.hindrance", self.hindrance, MOST_HINDRANCE)?;

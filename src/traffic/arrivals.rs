@@ -1,10 +1,10 @@
 //! Cars come, wait outside until there is room, and leave at the end of their path.
 
-use super::car::style;
+use super::car::{large, style};
 use super::clock::Clock;
 use super::model::{FASTEST, square};
 use super::units::{BEYOND, FINER_SPEED, falls_below, length};
-use super::{Car, Network, Others, Setting};
+use super::{Car, Kind, Network, Others, Setting, Stretch, Zone};
 use crate::layout::shared::constants;
 
 constants! {
@@ -18,6 +18,9 @@ constants! {
     const ENTRY_ROOM: i32 = length(3.0);
     /// Twice the braking with which it could stop behind the one before it (m/s²).
     const STOPS_WITH: i32 = 3;
+    /// Steps of standing beyond the line after which a car is taken away where there may be large vehicles, of which a
+    /// few can block a full ring for ever.
+    const STUCK: u32 = 1200;
 }
 
 /// Cars that wait outside: four bits a source.
@@ -34,6 +37,8 @@ pub enum Event {
     Entered(usize, usize),
     /// The car of a slot has driven its path to the end; it is gone after this.
     Left(usize),
+    /// The car of a slot has stood in a ring that is blocked for two minutes; it is gone after this.
+    Removed(usize),
 }
 
 /// Word and lowest bit of a source in the backlog.
@@ -69,6 +74,9 @@ pub fn arrive(
         if car.is_there() && network.paths[car.path()].length <= car.front() {
             tell(Event::Left(slot), cars);
             cars[slot] = Car::NONE;
+        } else if is_stuck(network, &car) {
+            tell(Event::Removed(slot), cars);
+            cars[slot] = Car::NONE;
         }
     }
     // One draw for all sources: their rates are exact, and at most one car comes in a step.
@@ -99,9 +107,19 @@ fn entering(setting: Setting, clock: Clock, cars: &[Car], source: usize, others:
     let paths = network.paths_of(source);
     let last = paths.end - 1;
     let path = paths.clone().find(|&path| falls_below(drawn, demand.shares[path])).unwrap_or(last);
-    let car = Car::entering(path, style([kind, driver], demand), 0);
     let of_source = cars.iter().filter(|other| other.is_there() && paths.contains(&other.path()));
-    let ahead = of_source.map(|other| (other.rear(), other.pace())).chain(others.ahead(&car));
+    let car = Car::entering(path, style([kind, driver], demand), 0);
+    let before = || {
+        let of_source = cars.iter().enumerate().filter(|(_, other)| other.is_there() && paths.contains(&other.path()));
+        of_source.min_by_key(|(_, other)| other.rear())
+    };
+    let car = match network.large.as_ref().and_then(|_| before()) {
+        Some((slot, other)) => car.replaced_by(large(clock.next_large(source, slot as u32, other.style()), demand)),
+        None => car.replaced_by(large(kind, demand)),
+    };
+    let car = if network.fits(&car) { car } else { car.replaced_by(0) };
+    let beside = cars.iter().filter_map(|other| beside(network, &car, other));
+    let ahead = of_source.map(|other| (other.rear(), other.pace())).chain(beside).chain(others.ahead(&car));
     let (rear, pace) = ahead.fold((BEYOND, 0), |nearest, other| if other.0 < nearest.0 { other } else { nearest });
     let room = rear - car.front();
     if room < ENTRY_ROOM {
@@ -109,6 +127,31 @@ fn entering(setting: Setting, clock: Clock, cars: &[Car], source: usize, others:
     }
     let pace = entry_pace(network, &car, (room - rules.gap).max(0), pace);
     Some(Car { speed: pace << FINER_SPEED, ..car })
+}
+
+/// Whether a car stands in a ring that is blocked.
+fn is_stuck(network: &Network, car: &Car) -> bool {
+    network.large.is_some() && car.is_there() && STUCK <= car.standing() && network.line_of(car)[0] < car.front()
+}
+
+/// Rear and speed of a car on another lane that is in the way of one that enters, where one of them is large.
+fn beside(network: &Network, car: &Car, other: &Car) -> Option<(i32, i32)> {
+    let large = network.large.as_ref()?;
+    let classes = [car.class(), other.class()];
+    if !other.is_there() || classes == [0, 0] {
+        return None;
+    }
+    let pair = large.pair(network.paths.len(), classes, [car.path(), other.path()]);
+    let zones = large.zones[usize::from(pair.first)..][..usize::from(pair.n)].iter().map(Zone::stretch);
+    let is_near = |zone: &Stretch| {
+        let is_there = zone.b_in <= other.front() && other.rear() <= zone.b_out;
+        zone.a_in <= car.front() + ENTRY_ROOM && is_there
+    };
+    let rear = zones.filter(is_near).map(|zone| match zone.kind {
+        Kind::Follow => zone.beside(other.rear()),
+        _ => zone.a_in,
+    });
+    rear.min().map(|rear| (rear, other.pace()))
 }
 
 /// Speed of a car that enters behind another one with this room to stop: that it can, and is 0.8 s behind (2^-14 m a

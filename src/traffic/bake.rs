@@ -2,7 +2,9 @@
 
 use super::Error;
 use super::meetings::{FINE, Part, Points, parts};
-use super::network::{CELL, Kind, MOST_PATHS, MOST_SOURCES, Network, Pair, Path, Sample, Source, UNIT, Zone};
+use super::network::{
+    CELL, Kind, MOST_PATHS, MOST_SOURCES, MOST_ZONES, Network, Pair, Path, Sample, Source, UNIT, Zone,
+};
 use super::paths::{Course, courses};
 use super::units::length;
 use crate::map::Road;
@@ -19,7 +21,7 @@ const WIDE: f64 = 7.5;
 /// The length for such a vehicle: a bypass outside the ring comes near it only after 20 m (m).
 const WIDE_REACH: f64 = 22.0;
 /// Paths that cross at less than this angle are followed through the crossing (rad).
-const SHALLOW: f64 = 0.8;
+pub(super) const SHALLOW: f64 = 0.8;
 /// Paths that meet at less than this angle become one (rad).
 const PARALLEL: f64 = 0.2;
 /// Points at the same place from which on two paths have become one.
@@ -27,13 +29,11 @@ const JOINED: usize = 7;
 /// Largest angle to ring traffic beside an entry; the carriageway beside it runs the other way (rad).
 const SAME_WAY: f64 = 1.2;
 /// Distance of a waiting car's front from the first zone (m).
-const BEFORE_ZONE: f64 = 0.3;
+pub(super) const BEFORE_ZONE: f64 = 0.3;
 /// Zones that begin up to here behind the line are those of the entry (m).
 pub(super) const ENTRY: f64 = 12.0;
 /// Length of the zone on a path of ring traffic that only passes beside (m).
 const SOFT_LENGTH: f64 = 2.0;
-/// Most zones of a road: a pair names its first in 16 bits.
-const MOST_ZONES: usize = 1 << 16;
 /// Longest path: a pair has its ends in 8 bits of 2 m (m).
 const LONGEST: f64 = 508.0;
 
@@ -74,7 +74,7 @@ impl Network {
     }
 }
 
-fn too_large(road: &Road, of: &'static str, value: usize, most: usize) -> Error {
+pub(super) fn too_large(road: &Road, of: &'static str, value: usize, most: usize) -> Error {
     Error::TooLarge { road: road.name.clone(), of, value, most }
 }
 
@@ -213,7 +213,16 @@ fn tables(
             b: outwards(of_pair.iter().map(|meeting| meeting.b)),
         });
     }
-    Network { has_ring: 0.0 < ground.island_radius, n_arms: ground.arms.len(), paths, samples, pairs, zones, sources }
+    Network {
+        has_ring: 0.0 < ground.island_radius,
+        n_arms: ground.arms.len(),
+        paths,
+        samples,
+        pairs,
+        zones,
+        sources,
+        large: None,
+    }
 }
 
 fn packed(meeting: &Meeting) -> Zone {
@@ -228,7 +237,7 @@ fn packed(meeting: &Meeting) -> Zone {
 }
 
 /// From the first beginning to the last end, in cells.
-fn outwards(stretches: impl Iterator<Item = [f64; 2]>) -> [u8; 2] {
+pub(super) fn outwards(stretches: impl Iterator<Item = [f64; 2]>) -> [u8; 2] {
     let ends = stretches.fold([f64::INFINITY, 0.0f64], |[low, high], [from, to]| [low.min(from), high.max(to)]);
     let [low, high] = ends.map(|s| s / f64::from(CELL));
     [low.floor() as u8, high.ceil() as u8]

@@ -1,10 +1,11 @@
-//! A car: sixteen bytes, of which its pose follows, and its outline.
+//! A car, or a larger vehicle: sixteen bytes, of which its pose follows, and its outlines.
 //!
 //! A car has neither heading nor lateral position: it is where its path is, so it cannot leave it.
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec2;
 
+use super::large::{LARGE, Large, Shape, TRACTOR};
 use super::units::{FINER_SPEED, FINER_STATION, falls_below, length as in_units, metres};
 use super::{Demand, Network, STEP};
 use crate::layout::shared::constants;
@@ -129,8 +130,14 @@ impl Car {
         (self.what & NO_PATH) as usize
     }
 
-    fn style(&self) -> u32 {
+    pub(super) fn style(&self) -> u32 {
         (self.what >> STYLE) & NO_PATH
+    }
+
+    /// A large vehicle of this kind in its place, or a car or a van if it is none.
+    pub(super) fn replaced_by(&self, large: u32) -> Car {
+        let style = (self.style() & ((1 << LARGE) - 1)) | (large << LARGE);
+        Car { station: extent(style) << FINER_STATION, what: self.path() as u32 | (style << STYLE), ..*self }
     }
 
     /// Steps for which it has been standing.
@@ -145,7 +152,21 @@ impl Car {
 
     /// Half its width (m).
     pub fn half_width(&self) -> f32 {
-        if self.style() & VAN == VAN { VAN_HALF_WIDTH } else { HALF_WIDTH }
+        match self.large() {
+            Some(large) => large.shape().half_width,
+            None if self.style() & VAN == VAN => VAN_HALF_WIDTH,
+            None => HALF_WIDTH,
+        }
+    }
+
+    /// Which large vehicle it is; none of a car or a van.
+    pub fn large(&self) -> Option<Large> {
+        kind(self.style())
+    }
+
+    /// Its class by the room that it needs; 0 of a car or a van.
+    pub(super) fn class(&self) -> usize {
+        self.large().map_or(0, Large::class)
     }
 
     /// From -15, who drives slowly and keeps his distance, to 15, in steps of 2.
@@ -176,18 +197,58 @@ impl Car {
         Car { station: self.station + way, speed, what, ..*self }
     }
 
-    /// The ground that it covers: both axles are on the path, so in bends its ends swing out and its middle cuts in.
-    pub fn outline(&self, network: &Network) -> Outline {
+    /// The ground that its units cover: one, or a tractor and its trailer.
+    pub fn outlines(&self, network: &Network) -> impl Iterator<Item = Outline> + Clone + use<> {
+        let Some(large) = self.large() else { return [Some(self.outline_of_car(network)), None].into_iter().flatten() };
+        let shape = large.shape();
+        let tractor = shape.has_tractor.then(|| self.tractor(network, large));
+        [tractor, Some(self.last_unit(network, large, &shape))].into_iter().flatten()
+    }
+
+    /// A car: both axles are on the path, so in bends its ends swing out and its middle cuts in.
+    fn outline_of_car(&self, network: &Network) -> Outline {
         let length = self.length();
         let axle = |overhang: f32| network.position(self.path(), self.station() - overhang * length);
         let [front, rear] = [axle(OVERHANG), axle(1.0 - OVERHANG)];
         let (middle, along) = (0.5 * (front + rear), (front - rear).normalize_or_zero());
         Outline { middle, along, half_length: 0.5 * length, half_width: self.half_width() }
     }
+
+    /// The unit of a large vehicle whose rear axle follows as a tractrix.
+    fn last_unit(&self, network: &Network, large: Large, shape: &Shape) -> Outline {
+        let (hinge, along) = network.trail(self.path(), self.station() - shape.hinge, large);
+        let half_length = 0.5 * shape.body();
+        Outline {
+            middle: hinge + (shape.ahead - half_length) * along,
+            along,
+            half_length,
+            half_width: shape.half_width,
+        }
+    }
+
+    /// A tractor: both axles follow the same line.
+    fn tractor(&self, network: &Network, large: Large) -> Outline {
+        let [steered, driven, length] = TRACTOR;
+        let axle = |behind: f32| network.trail(self.path(), self.station() - behind, large).0;
+        let [front, rear] = [axle(steered), axle(driven)];
+        let along = (front - rear).normalize_or_zero();
+        let half_length = 0.5 * length;
+        Outline { middle: front + (steered - half_length) * along, along, half_length, half_width: self.half_width() }
+    }
+}
+
+fn kind(style: u32) -> Option<Large> {
+    Large::ALL.get((style >> LARGE).wrapping_sub(1) as usize).copied()
 }
 
 fn extent(style: u32) -> i32 {
-    if style & VAN == VAN { VAN_LENGTH } else { SHORTEST + LONGER * ((style >> LENGTH) & 3) as i32 }
+    if let Some(large) = kind(style) {
+        large.extent()
+    } else if style & VAN == VAN {
+        VAN_LENGTH
+    } else {
+        SHORTEST + LONGER * ((style >> LENGTH) & 3) as i32
+    }
 }
 
 /// A style drawn from random words.
@@ -196,6 +257,12 @@ pub(super) fn style(words: [u32; 2], demand: &Demand) -> u32 {
     let flag = |word: u32, probability: u32, flag: u32| if falls_below(word, probability) { flag } else { 0 };
     // Upper bits tell the kind, lower ones length and temperament.
     (kind & (VAN - 1)) | flag(kind, demand.vans, VAN) | flag(driver, demand.rude, RUDE)
+}
+
+/// The code of a large vehicle drawn from a random word; 0 is none.
+pub(super) fn large(word: u32, demand: &Demand) -> u32 {
+    let kind = demand.large.iter().position(|&until| falls_below(word, until)).map_or(0, |index| index as u32 + 1);
+    if falls_below(word, demand.vans) { 0 } else { kind }
 }
 
 /// A rectangle on the ground.

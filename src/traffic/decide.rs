@@ -9,8 +9,9 @@ mod entry;
 pub(super) use entry::{GONE_BEFORE, LEAST_CROSSING, printed_constants as printed_entry};
 
 use super::clock::Clock;
+use super::large::{MOST_OF_LARGE, PACE_OF_LARGE};
 use super::model::{ONE, acceleration, braking_of, following, square, still_stops, stopping, time};
-use super::network::{Kind, Stretch, cell};
+use super::network::{Kind, Pair, Stretch, Zone, cell};
 use super::rules::{SPEED_PARTS, TIME_PARTS};
 use super::units::{BEYOND, falls_below, length, speed};
 use super::{Car, Network, Others, Rules};
@@ -53,6 +54,8 @@ pub(super) struct Crowd<'a> {
     n: usize,
     slot: [u32; MOST_CARS],
     path: [u16; MOST_CARS],
+    /// Its class by the room that it needs.
+    class: [u8; MOST_CARS],
     /// Beginning and end of what may matter of it, in cells.
     rear: [u8; MOST_CARS],
     front: [u8; MOST_CARS],
@@ -84,13 +87,14 @@ pub struct Seen {
 impl<'a> Crowd<'a> {
     /// The cars of a row; at most [`MOST_CARS`] slots are looked at.
     pub(super) fn new(network: &'a Network, rules: &'a Rules, clock: Clock, cars: &'a [Car]) -> Crowd<'a> {
-        let (slot, path) = ([0; MOST_CARS], [0; MOST_CARS]);
+        let (slot, path, class) = ([0; MOST_CARS], [0; MOST_CARS], [0; MOST_CARS]);
         let (rear, front) = ([0; MOST_CARS], [0; MOST_CARS]);
-        let mut crowd = Crowd { network, rules, clock, cars, n: 0, slot, path, rear, front };
+        let mut crowd = Crowd { network, rules, clock, cars, n: 0, slot, path, class, rear, front };
         for (index, car) in cars.iter().take(MOST_CARS).enumerate().filter(|(_, car)| car.is_there()) {
             let k = crowd.n;
             crowd.slot[k] = index as u32;
             crowd.path[k] = car.path() as u16;
+            crowd.class[k] = car.class() as u8;
             crowd.rear[k] = cell(car.rear() - BEHIND);
             crowd.front[k] = cell(car.front() + SIGHT_OF_OTHERS);
             crowd.n += 1;
@@ -101,7 +105,7 @@ impl<'a> Crowd<'a> {
     /// The car in a slot, as it is weighed.
     fn seen(&self, slot: usize) -> Seen {
         let car = &self.cars[slot];
-        let line = self.network.paths[car.path()].line;
+        let [line, _] = self.network.line_of(car);
         let (station, speed, square) = (car.front(), car.pace(), square(car.pace()));
         Seen {
             slot: slot as u32,
@@ -119,31 +123,57 @@ impl<'a> Crowd<'a> {
     /// The acceleration that the car in a slot decides (2^-19 m a step²).
     pub(super) fn decided(&self, slot: usize, others: &impl Others) -> i32 {
         let mut driver = Driver::new(self, slot);
-        let ahead = cell(driver.me.station + SIGHT);
-        let behind = cell(driver.me.station - driver.me.length - BEHIND);
-        let pairs = &self.network.pairs[driver.path * self.network.paths.len()..][..self.network.paths.len()];
+        let n_paths = self.network.paths.len();
+        let (path, class) = (driver.path, self.cars[slot].class());
+        let pairs = &self.network.pairs[path * n_paths..][..n_paths];
+        let of_cars = |k: usize| &pairs[usize::from(self.path[k])];
+        let ends = [cell(driver.me.station - driver.me.length - BEHIND), cell(driver.me.station + SIGHT)];
+        match &self.network.large {
+            None => self.weigh(&mut driver, ends, of_cars, |_| &self.network.zones),
+            Some(large) => {
+                let of_large = |k: usize| {
+                    let classes = [class, usize::from(self.class[k])];
+                    (classes != [0, 0]).then(|| large.pair(n_paths, classes, [path, usize::from(self.path[k])]))
+                };
+                let pair = |k: usize| of_large(k).unwrap_or_else(|| of_cars(k));
+                let zones = |k: usize| if of_large(k).is_some() { &large.zones } else { &self.network.zones };
+                self.weigh(&mut driver, ends, pair, zones);
+            }
+        }
+        others.hinder(&mut driver);
+        driver.decided()
+    }
+
+    /// Has a driver, who looks at these cells of its path, take all other cars into account, by their pairs of paths
+    /// and the zones of these.
+    fn weigh<'t>(
+        &self,
+        driver: &mut Driver,
+        [behind, ahead]: [u8; 2],
+        pair: impl Fn(usize) -> &'t Pair,
+        zones: impl Fn(usize) -> &'t Vec<Zone>,
+    ) {
+        let slot = driver.me.slot;
         // Most cars are near no zone that this one is near: they are sorted out without a branch.
         let (mut near, mut n_near) = ([0u8; MOST_CARS], 0);
         for k in 0..self.n {
-            let pair = &pairs[usize::from(self.path[k])];
+            let pair = pair(k);
             let is_near = (0 < pair.n)
                 & (pair.a[0] <= ahead)
                 & (behind <= pair.a[1])
                 & (pair.b[0] <= self.front[k])
                 & (self.rear[k] <= pair.b[1])
-                & (self.slot[k] as usize != slot);
+                & (self.slot[k] != slot);
             near[n_near] = k as u8;
             n_near += usize::from(is_near);
         }
         for &k in &near[..n_near] {
             let k = usize::from(k);
-            let pair = &pairs[usize::from(self.path[k])];
+            let pair = pair(k);
             let other = self.seen(self.slot[k] as usize);
-            let zones = &self.network.zones[usize::from(pair.first)..][..usize::from(pair.n)];
+            let zones = &zones(k)[usize::from(pair.first)..][..usize::from(pair.n)];
             zones.iter().for_each(|zone| driver.consider(&zone.stretch(), &other));
         }
-        others.hinder(&mut driver);
-        driver.decided()
     }
 }
 
@@ -198,7 +228,7 @@ impl<'a> Driver<'a> {
             }
             ([true, false], _) => {}
             ([false, true], Kind::Follow) => {
-                let gap = other.station - zone.delta - other.length - me.station;
+                let gap = zone.beside(other.station - other.length) - me.station;
                 self.stop_or_follow(zone.a_in - me.station, gap, other.speed);
             }
             ([false, true], Kind::Cross) => self.stop_before(zone.a_in - me.station),
@@ -208,9 +238,8 @@ impl<'a> Driver<'a> {
 
     /// Both are where paths run together: who is ahead leads.
     fn follow_inside(&mut self, zone: &Stretch, other: &Seen) {
-        let ahead = other.station - zone.delta;
-        if self.me.station < ahead || (ahead == self.me.station && other.slot < self.me.slot) {
-            let rear = ahead - other.length;
+        if zone.is_ahead(self.me.station, other.station, other.slot < self.me.slot) {
+            let rear = zone.beside(other.station - other.length);
             self.follow(rear - self.me.station, other.speed);
             self.note_leader(rear, other.speed);
         }
@@ -315,8 +344,11 @@ impl<'a> Driver<'a> {
         let car = self.car();
         // Half a step ahead: a speed's unit is the way of half a step.
         let limit = self.network().limit(self.path, car.station + car.speed);
+        let is_large = car.large().is_some();
+        let limit = if is_large { (limit * PACE_OF_LARGE) >> 4 } else { limit };
         let wished = limit.max(LEAST_WISHED) * (SPEED_PARTS + self.temperament) / SPEED_PARTS;
-        let decided = acceleration(self.me.speed, wished, self.interaction);
+        let most = if is_large { MOST_OF_LARGE } else { i32::MAX };
+        let decided = acceleration(self.me.speed, wished, self.interaction).min(most);
         if LOOKS_UP <= decided && self.looks_away() { car.acceleration.min(0) } else { decided }
     }
 

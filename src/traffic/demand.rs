@@ -1,5 +1,6 @@
 //! How many cars want to go where, and which kinds of them.
 
+use super::large::N_LARGE;
 use super::network::Network;
 use super::units::probability;
 use super::{Error, STEP};
@@ -18,6 +19,15 @@ pub struct Mix {
     pub vans: f32,
     /// Fraction of rude drivers, who let nobody in.
     pub rude: f32,
+    /// Fractions of buses, rigid trucks and tractor-trailers; needs a network with tables of such.
+    pub large: [f32; N_LARGE],
+}
+
+impl Mix {
+    /// Whether there are large vehicles.
+    pub fn has_large(&self) -> bool {
+        self.large.iter().any(|&fraction| 0.0 < fraction)
+    }
 }
 
 /// Arrivals at a road.
@@ -31,13 +41,17 @@ pub struct Demand {
     pub(super) vans: u32,
     /// Fraction of rude drivers (2^-24).
     pub(super) rude: u32,
+    /// Of every kind of large vehicles the fraction of those, of the kinds before it and of vans (2^-24); empty where
+    /// there are none.
+    pub(super) large: Vec<u32>,
 }
 
 impl Demand {
-    /// The numbers as words: those of sources, of paths, of vans and of rude drivers.
+    /// The numbers as words: those of sources, of paths, of vans, of rude drivers, and of large vehicles if there are
+    /// some.
     pub(crate) fn words(&self) -> Vec<u32> {
-        let Demand { arrivals, shares, vans, rude } = self;
-        arrivals.iter().chain(shares).chain([vans, rude]).copied().collect()
+        let Demand { arrivals, shares, vans, rude, large } = self;
+        arrivals.iter().chain(shares).chain([vans, rude]).chain(large).copied().collect()
     }
 
     /// Arrivals by path (veh/h).
@@ -56,7 +70,9 @@ impl Demand {
             return Err(Error::NoRing { flow: total, most: MOST_WITHOUT_RING });
         }
         let [vans, rude] = [mix.vans, mix.rude].map(|fraction| probability(fraction.into()));
-        let mut demand = Demand { arrivals: Vec::new(), shares: vec![0; flows.len()], vans, rude };
+        let until = |kind: usize| f64::from(mix.vans) + mix.large[..=kind].iter().copied().map(f64::from).sum::<f64>();
+        let large = (0..N_LARGE).filter(|_| mix.has_large()).map(|kind| probability(until(kind))).collect();
+        let mut demand = Demand { arrivals: Vec::new(), shares: vec![0; flows.len()], vans, rude, large };
         let mut sum = 0.0;
         for source in 0..network.sources.len() {
             let paths = network.paths_of(source);

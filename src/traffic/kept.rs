@@ -10,19 +10,25 @@ use crate::map::Road;
 const FORM: u32 = 2;
 
 impl Network {
-    /// What [`Network::bake`] gives, from the cache if it was kept there before; else it is kept now.
+    /// What [`Network::bake`] gives, [with large vehicles](Network::with_large) if there are some, from the cache if it
+    /// was kept there before; else it is kept now.
     ///
     /// # Errors
     ///
     /// Those of [`Network::bake`].
-    pub fn cached(road: &Road, cache: &Cache) -> Result<Network, Error> {
-        let key = key(road);
-        let kept = cache.get("traffic", &key).filter(|bytes| bytes.len().is_multiple_of(4));
+    pub fn cached(road: &Road, has_large: bool, cache: Option<&Cache>) -> Result<Network, Error> {
+        let baked = || {
+            let network = Network::bake(road)?;
+            if has_large { network.with_large(road) } else { Ok(network) }
+        };
+        let Some(cache) = cache else { return baked() };
+        let (key, folder) = (key(road), if has_large { "traffic-large" } else { "traffic" });
+        let kept = cache.get(folder, &key).filter(|bytes| bytes.len().is_multiple_of(4));
         if let Some(network) = kept.and_then(|bytes| Network::parsed(&pod_collect_to_vec::<u8, u32>(&bytes))) {
             return Ok(network);
         }
-        let network = Network::bake(road)?;
-        cache.put("traffic", &key, cast_slice(&network.words()));
+        let network = baked()?;
+        cache.put(folder, &key, cast_slice(&network.words()));
         Ok(network)
     }
 }
@@ -51,12 +57,15 @@ mod tests {
         for name in ["16m", "20m"] {
             let road = Road::named(name).unwrap();
             let baked = Network::bake(&road).unwrap();
-            assert_eq!(Network::cached(&road, &cache).unwrap(), baked);
-            assert_eq!(Network::cached(&road, &cache).unwrap(), baked);
+            assert_eq!(Network::cached(&road, false, Some(&cache)).unwrap(), baked);
+            assert_eq!(Network::cached(&road, false, Some(&cache)).unwrap(), baked);
+            assert_eq!(Network::cached(&road, false, None).unwrap(), baked);
+            let large = Network::cached(&road, true, Some(&cache)).unwrap();
+            assert!(large.large.is_some() && large == Network::cached(&road, true, Some(&cache)).unwrap());
             let kept = cache.get("traffic", &key(&road)).unwrap();
             assert_eq!(Network::parsed(&pod_collect_to_vec::<u8, u32>(&kept)), Some(baked));
         }
-        assert_eq!(folder.path().read_dir().unwrap().count(), 2);
+        assert_eq!(folder.path().read_dir().unwrap().count(), 4);
     }
 
     #[test]

@@ -35,20 +35,34 @@ impl Points {
         self.points.len()
     }
 
+    /// One of its points (m).
+    pub(super) fn point(&self, index: usize) -> DVec2 {
+        self.points[index]
+    }
+
+    /// Unit vector along the line there.
+    pub(super) fn along(&self, index: usize) -> DVec2 {
+        DVec2::from_angle(self.headings[index])
+    }
+
     /// Angle between the directions of two lines, each at one of its points (rad).
     pub(super) fn angle(&self, index: usize, other: &Points, other_index: usize) -> f64 {
         wrapped(self.headings[index] - other.headings[other_index]).abs()
     }
 
-    /// Stretches of the other line within `within` of a point of this one.
-    fn intervals(&self, row: usize, other: &Points, within: f64) -> Vec<Interval> {
+    /// Stretches of the other line within `within` of a point of this one, `most` at most.
+    fn intervals(&self, row: usize, other: &Points, most: f64, within: impl Fn(usize, usize) -> f64) -> Vec<Interval> {
         let mut found: Vec<Interval> = Vec::new();
         let mut index = 0;
         while index < other.points.len() {
             let distance = self.points[row].distance(other.points[index]);
-            if within <= distance {
+            if most <= distance {
                 // No nearer point can come sooner.
-                index += (((distance - within) / FINE) as usize).max(1);
+                index += (((distance - most) / FINE) as usize).max(1);
+                continue;
+            }
+            if within(row, index) <= distance {
+                index += 1;
                 continue;
             }
             match found.last_mut() {
@@ -67,12 +81,18 @@ impl Points {
 }
 
 /// Points of one line that are near a point of another: from the first to the last, and the nearest.
-struct Interval {
-    row: usize,
-    low: usize,
-    high: usize,
-    distance: f64,
-    nearest: usize,
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Interval {
+    /// The point of the other.
+    pub row: usize,
+    /// First of the points.
+    pub low: usize,
+    /// Last of them.
+    pub high: usize,
+    /// Distance of the nearest (m).
+    pub distance: f64,
+    /// The nearest.
+    pub nearest: usize,
 }
 
 /// A connected part of the set of near pairs, by indices of points.
@@ -132,6 +152,25 @@ impl Part {
 /// The connected parts of the pairs of points that are nearer than `within`, for the points `rows` of a, in the order
 /// in which they begin on a.
 pub(super) fn parts(a: &Points, b: &Points, within: f64, rows: Range<usize>) -> Vec<Part> {
+    let whole = |intervals: Vec<Interval>| {
+        let parts = intervals.iter().map(Part::new);
+        parts.reduce(|mut whole, part| {
+            whole.add(&part);
+            whole
+        })
+    };
+    components(a, b, within, |_, _| within, rows).into_iter().filter_map(whole).collect()
+}
+
+/// The connected parts of the pairs of points of which the distance is below what is asked of a point of a and a point
+/// of b, `most` at most: of each its intervals, by the point of a.
+pub(super) fn components(
+    a: &Points,
+    b: &Points,
+    most: f64,
+    within: impl Fn(usize, usize) -> f64,
+    rows: Range<usize>,
+) -> Vec<Vec<Interval>> {
     let mut intervals: Vec<Interval> = Vec::new();
     // An interval leads to an earlier one of its part, the first to itself.
     let mut leads: Vec<usize> = Vec::new();
@@ -144,7 +183,7 @@ pub(super) fn parts(a: &Points, b: &Points, within: f64, rows: Range<usize>) -> 
     let mut above = 0..0;
     for row in rows.start..rows.end.min(a.len()) {
         let begin = intervals.len();
-        for interval in a.intervals(row, b, within) {
+        for interval in a.intervals(row, b, most, &within) {
             let index = leads.len();
             leads.push(index);
             for other in above.clone() {
@@ -158,10 +197,9 @@ pub(super) fn parts(a: &Points, b: &Points, within: f64, rows: Range<usize>) -> 
         }
         above = begin..intervals.len();
     }
-    let mut found: BTreeMap<usize, Part> = BTreeMap::new();
+    let mut found: BTreeMap<usize, Vec<Interval>> = BTreeMap::new();
     for (index, interval) in intervals.iter().enumerate() {
-        let part = Part::new(interval);
-        found.entry(first(&leads, index)).and_modify(|whole| whole.add(&part)).or_insert(part);
+        found.entry(first(&leads, index)).or_default().push(*interval);
     }
     found.into_values().collect()
 }

@@ -7,6 +7,7 @@ use glam::Vec2;
 
 use super::Drivers;
 use super::drivers::PACE_PARTS;
+use super::large::{LargeTables, taken};
 use super::units::{FINER_STATION, metres};
 use crate::layout::shared::constants;
 
@@ -24,6 +25,14 @@ constants! {
     const UNIT_BITS: u32 = 4;
     /// Bits of a station of decisions below the unit of pairs.
     const CELL_BITS: u32 = 11;
+    /// Bits of a zone's ratio below 1.
+    const ZONE_RATIO_BITS: u32 = 12;
+    /// Bit of a zone's kind at which its ratio begins.
+    const ZONE_RATIO: u32 = 2;
+    /// Bits of a length by which stations along a zone are compared below those of decisions.
+    const COARSER: u32 = 5;
+    /// Bit of a network's first word that says that there are tables of large vehicles.
+    const HAS_LARGE: u32 = 2;
     /// Words before the tables of a road.
     const NETWORK_HEAD: usize = 6;
     /// Words of a path.
@@ -50,6 +59,10 @@ constants! {
 pub const MOST_PATHS: usize = 1023;
 /// Most sources of a road: each has four bits of the backlog.
 pub const MOST_SOURCES: usize = 16;
+/// Most zones of a road: a pair names its first in 16 bits.
+pub(super) const MOST_ZONES: usize = 1 << 16;
+/// Units of a zone's ratio in 1.
+pub(super) const RATIO_ONE: i16 = 1 << ZONE_RATIO_BITS;
 
 /// A route as cars drive it.
 #[repr(C)]
@@ -127,7 +140,7 @@ pub struct Zone {
     pub b: [u16; 2],
     /// In a zone that is followed: station on b less that on a (1/64 m).
     pub delta: i16,
-    /// Code of its [`Kind`].
+    /// Code of its [`Kind`]; above it how far a station on a goes less than a metre for each metre on b (2^-12).
     pub kind: u16,
 }
 
@@ -144,8 +157,30 @@ pub struct Stretch {
     pub b_out: i32,
     /// Station on b less that on a (2^-10 m).
     pub delta: i32,
+    /// How far a station on a goes less than a metre for each metre on b, within the zone (2^-12).
+    pub slower: i32,
     /// How the paths meet.
     pub kind: Kind,
+}
+
+impl Stretch {
+    /// The station on a that is beside one on b (2^-10 m).
+    pub(super) fn beside(&self, station: i32) -> i32 {
+        let within = station.clamp(self.b_in, self.b_out) - self.b_in;
+        station - self.delta - (((within >> 2) * self.slower) >> (ZONE_RATIO_BITS - 2))
+    }
+
+    /// Whether a vehicle on b, with its front at a station, is ahead of one on a; both find the same (2^-10 m).
+    pub(super) fn is_ahead(&self, own: i32, its: i32, its_slot_is_lower: bool) -> bool {
+        let [mine, its] = if self.slower == 0 {
+            [own, its - self.delta]
+        } else {
+            // By the parts of the zone that they have driven: what both find is alike to the last bit.
+            let part = |own: i32, length: i32| (own >> COARSER) * (length >> COARSER);
+            [part(own - self.a_in, self.b_out - self.b_in), part(its - self.b_in, self.a_out - self.a_in)]
+        };
+        mine < its || (mine == its && its_slot_is_lower)
+    }
 }
 
 impl Zone {
@@ -154,7 +189,8 @@ impl Zone {
         let [a_in, a_out, b_in, b_out] =
             [self.a[0], self.a[1], self.b[0], self.b[1]].map(|s| i32::from(s) << UNIT_BITS);
         let kind = Kind::ALL[usize::from(self.kind & 3)];
-        Stretch { a_in, a_out, b_in, b_out, delta: i32::from(self.delta) << UNIT_BITS, kind }
+        let slower = i32::from(self.kind.cast_signed() >> ZONE_RATIO);
+        Stretch { a_in, a_out, b_in, b_out, delta: i32::from(self.delta) << UNIT_BITS, slower, kind }
     }
 }
 
@@ -210,28 +246,30 @@ pub struct Network {
     pub zones: Vec<Zone>,
     /// In the order of their paths.
     pub sources: Vec<Source>,
+    /// Those of large vehicles, where there may be some.
+    pub large: Option<LargeTables>,
 }
 
 impl Network {
     /// Position and direction of travel at a station of a path: cubic between samples (m).
     pub fn pose(&self, path: usize, station: f32) -> (Vec2, Vec2) {
-        let ([from, to], t) = self.span(path, station);
+        let (k, t) = self.span(path, station);
+        let [from, to] = [&self.samples[k], &self.samples[k + 1]];
         (between(from, to, t), (from.direction + t * (to.direction - from.direction)).normalize_or_zero())
     }
 
     /// The position of [`pose`](Self::pose) alone (m).
     pub fn position(&self, path: usize, station: f32) -> Vec2 {
-        let ([from, to], t) = self.span(path, station);
-        between(from, to, t)
+        let (k, t) = self.span(path, station);
+        between(&self.samples[k], &self.samples[k + 1], t)
     }
 
-    /// The samples before and behind a station of a path, and the fraction of the way from one to the other.
-    fn span(&self, path: usize, station: f32) -> ([&Sample; 2], f32) {
+    /// The sample before a station of a path, and the fraction of the way from it to the next.
+    pub(super) fn span(&self, path: usize, station: f32) -> (usize, f32) {
         let Path { first, n, .. } = self.paths[path];
         let along = (station / SPACING).clamp(0.0, n as f32 - 1.001);
         let k = along as usize;
-        let from = first as usize + k;
-        ([&self.samples[from], &self.samples[from + 1]], along - k as f32)
+        (first as usize + k, along - k as f32)
     }
 
     /// Speed of a car that nothing hinders, at a station of a path: linear between samples (2^-14 m a step, 2^-20 m).
@@ -271,14 +309,17 @@ impl Network {
     pub fn words(&self) -> Vec<u32> {
         let counts = [self.paths.len(), self.samples.len(), self.zones.len(), self.sources.len(), self.n_arms];
         let head = counts.map(|count| count as u32);
+        let large = self.large.as_ref().map(LargeTables::words);
+        let has_large = if large.is_some() { HAS_LARGE } else { 0 };
         let tables = [
-            &[u32::from(self.has_ring)],
+            &[u32::from(self.has_ring) | has_large],
             &head[..],
             cast_slice(&self.paths),
             cast_slice(&self.samples),
             &pod_collect_to_vec::<Pair, u32>(&self.pairs),
             &pod_collect_to_vec::<Zone, u32>(&self.zones),
             cast_slice(&self.sources),
+            &large.unwrap_or_default(),
         ];
         tables.concat()
     }
@@ -286,20 +327,24 @@ impl Network {
     /// The tables that these words are; `None` if they are none.
     pub(super) fn parsed(words: &[u32]) -> Option<Network> {
         let (head, mut rest) = words.split_at_checked(NETWORK_HEAD)?;
-        let [has_ring, n_paths, n_samples, n_zones, n_sources, n_arms] = head else { return None };
+        let [flags, n_paths, n_samples, n_zones, n_sources, n_arms] = head else { return None };
         let n_paths = *n_paths as usize;
-        if MOST_PATHS < n_paths || 1 < *has_ring {
+        if MOST_PATHS < n_paths || 1 | HAS_LARGE < *flags {
             return None;
         }
-        let network = Network {
-            has_ring: *has_ring == 1,
+        let mut network = Network {
+            has_ring: flags & 1 == 1,
             n_arms: *n_arms as usize,
             paths: taken(&mut rest, n_paths)?,
             samples: taken(&mut rest, *n_samples as usize)?,
             pairs: taken(&mut rest, n_paths * n_paths)?,
             zones: taken(&mut rest, *n_zones as usize)?,
             sources: taken(&mut rest, *n_sources as usize)?,
+            large: None,
         };
+        if flags & HAS_LARGE == HAS_LARGE {
+            network.large = Some(LargeTables::taken(&mut rest, n_paths, *n_samples as usize)?);
+        }
         (rest.is_empty() && network.is_whole()).then_some(network)
     }
 
@@ -318,7 +363,6 @@ impl Network {
     }
 }
 
-/// The next `n` values of a table, of which `words` then has the rest.
 /// The position this fraction of the way from one sample to the next (m).
 fn between(from: &Sample, to: &Sample, t: f32) -> Vec2 {
     let (t2, t3) = (t * t, t * t * t);
@@ -326,11 +370,4 @@ fn between(from: &Sample, to: &Sample, t: f32) -> Vec2 {
         + (t3 - 2.0 * t2 + t) * SPACING * from.direction
         + (3.0 * t2 - 2.0 * t3) * to.position
         + (t3 - t2) * SPACING * to.direction
-}
-
-fn taken<T: Pod>(words: &mut &[u32], n: usize) -> Option<Vec<T>> {
-    let n_words = n.checked_mul(size_of::<T>())?.checked_div(4)?;
-    let (table, rest) = words.split_at_checked(n_words)?;
-    *words = rest;
-    Some(pod_collect_to_vec(table))
 }

@@ -59,7 +59,11 @@ impl<'a> Run<'a> {
 
 /// Number of pairs of cars of a road that overlap.
 pub fn overlaps(network: &Network, cars: &[Car]) -> usize {
-    let outlines: Vec<_> = cars.iter().filter(|car| car.is_there()).map(|car| car.outline(network)).collect();
+    let there = cars.iter().filter(|car| car.is_there());
+    let outlines: Vec<Vec<_>> = there.map(|car| car.outlines(network).collect()).collect();
     let pairs = (0..outlines.len()).flat_map(|one| (0..one).map(move |other| (one, other)));
-    pairs.filter(|&(one, other)| outlines[one].overlaps(&outlines[other])).count()
+    let touch = |&(one, other): &(usize, usize)| {
+        outlines[one].iter().any(|unit| outlines[other].iter().any(|its| unit.overlaps(its)))
+    };
+    pairs.filter(touch).count()
 }

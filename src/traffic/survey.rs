@@ -214,7 +214,7 @@ impl<'a> Observer<'a> {
                     let free = *self.free.entry(car.what).or_insert_with(|| self.survey.free_time(unhindered));
                     self.known[slot] = self.outside[source].pop_front().map(|came| Known { came, free });
                 }
-                Event::Left(slot) => changed[slot] = true,
+                Event::Left(slot) | Event::Removed(slot) => changed[slot] = true,
             }
         }
         if !counts {

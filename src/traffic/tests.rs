@@ -2,6 +2,7 @@
 //! and entries have the capacities of the Highway Capacity Manual.
 
 mod capacity;
+mod large;
 mod orders;
 mod platoon;
 mod roads;
@@ -23,5 +24,5 @@ fn baked(name: &str) -> Network {
 }
 
 fn even(network: &Network, total: f64) -> Demand {
-    Demand::new(network, &Demand::even(network, total), Mix { vans: 0.25, rude: 0.1 }).unwrap()
+    Demand::new(network, &Demand::even(network, total), Mix { vans: 0.25, rude: 0.1, ..Mix::default() }).unwrap()
 }

@@ -90,7 +90,7 @@ impl Traffic {
         let Some(of) = &scenario.traffic else { return Ok(None) };
         let rules = Rules { courtesy: probability(of.courtesy), ..of.drivers.rules() };
         // Whether a driver is rude is drawn when an episode begins, and when a car comes.
-        let mix = Mix { vans: of.vans as f32, rude: 0.0 };
+        let mix = Mix { vans: of.vans as f32, rude: 0.0, large: of.large.map(|fraction| fraction as f32) };
         let done = AtomicU64::new(0);
         let road = |place: &Place| {
             loading.check()?;
@@ -151,10 +151,7 @@ impl TrafficRoad {
                 expected,
             })
         };
-        let network = match loading.cache {
-            Some(cache) => Network::cached(&place.roundabout, cache),
-            None => Network::bake(&place.roundabout),
-        };
+        let network = Network::cached(&place.roundabout, mix.has_large(), loading.cache);
         let network = network.map_err(invalid)?.driven_by(of.drivers);
         let level = |&total: &f64| {
             loading.check()?;

@@ -38,7 +38,14 @@ fn a_batch_without_vehicles_has_no_rows_of_them() {
 
 #[test]
 fn vehicles_drive_alike_whatever_the_batch_and_the_threads_and_restored_ones_go_on() {
-    let (scenario, world) = with_traffic("demand = [900, 1500]\nvans = 0.25\nrude = [0.0, 0.3]\n");
+    let keys = "demand = [900, 1500]\nvans = 0.25\nrude = [0.0, 0.3]\n";
+    for more in ["", "buses = 0.05\nrigid_trucks = 0.1\ntractor_trailers = 0.1\n"] {
+        assert_drive_alike(&format!("{keys}{more}"));
+    }
+}
+
+fn assert_drive_alike(keys: &str) {
+    let (scenario, world) = with_traffic(keys);
     let routes = scenario.split(Split::Train).to_vec();
     let stepped = |n_envs: usize, n_threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().unwrap();
@@ -240,6 +247,9 @@ fn a_benchmark_with_a_bad_key_of_traffic_is_refused_by_key_and_value() {
         ("demand = [-1]", "traffic.demand[0]: -1 veh/h"),
         ("demand = []", "traffic.demand: 0"),
         ("demand = [300]\nvans = 2.0", "traffic.vans: 2"),
+        ("demand = [300]\nbuses = -0.1", "traffic.buses: -0.1"),
+        ("demand = [300]\ntractor_trailers = 1.5", "traffic.tractor_trailers: 1.5"),
+        ("demand = [300]\nvans = 0.6\nbuses = 0.5", "traffic.vans and larger vehicles together: 1.1"),
         ("demand = [300]\ndrivers = \"drunk\"", "unknown variant `drunk`"),
         ("demand = [300]\nrude = [0.3, 0.1]", "traffic.rude: [0.3, 0.1]"),
         ("demand = [300]\nwaiting = -5", "traffic.waiting: -5 s"),

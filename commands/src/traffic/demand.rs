@@ -73,7 +73,7 @@ mod tests {
 
     #[test]
     fn a_demand_is_a_total_or_flows_of_arms_and_from_arm_to_arm() {
-        let place = Place::new(Road::named("16m").unwrap()).unwrap();
+        let place = Place::new(Road::named("16m").unwrap(), Mix::default()).unwrap();
         let of = |text: &str| place.demand(text, Mix::default()).map(|(_, flows)| flows);
         let from = |flows: &[f64], arm: usize| -> f64 {
             let paths = (0..flows.len()).filter(|&path| place.network.source_of(path).entry as usize == arm);

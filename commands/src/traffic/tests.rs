@@ -81,10 +81,19 @@ fn a_setting_that_no_run_can_have_is_refused_by_flag_and_value() {
 #[test]
 fn kinds_of_cars_are_fractions_of_known_kinds() {
     let of = |shares: &[&str]| mix(&shares.iter().map(|&share| share.to_owned()).collect::<Vec<_>>());
-    assert_eq!(of(&["vans=0.25", "rude=0.1"]).unwrap(), Mix { vans: 0.25, rude: 0.1 });
-    for wrong in ["vans", "vans=", "vans=1.5", "vans=-0.1", "vans=NaN", "buses=0.1"] {
+    assert_eq!(of(&["vans=0.25", "rude=0.1"]).unwrap(), Mix { vans: 0.25, rude: 0.1, ..Mix::default() });
+    let large = of(&["buses=0.1", "rigid_trucks=0.2", "tractor_trailers=0.3"]).unwrap();
+    assert_eq!(large, Mix { large: [0.1, 0.2, 0.3], ..Mix::default() });
+    let message = of(&["vans=0.6", "buses=0.5"]).unwrap_err().to_string();
+    assert_eq!(message, "--share: vans=0.6 buses=0.5; vans, buses and trucks must be at most 1 together");
+    for wrong in ["vans", "vans=", "vans=1.5", "vans=-0.1", "vans=NaN", "trams=0.1"] {
         let message = of(&[wrong]).unwrap_err().to_string();
-        assert_eq!(message, format!("--share: {wrong}; must be vans=F or rude=F with F in 0..1"));
+        assert_eq!(
+            message,
+            format!(
+                "--share: {wrong}; must be vans=F, buses=F, rigid_trucks=F, tractor_trailers=F or rude=F with F in 0..1"
+            )
+        );
     }
 }
 

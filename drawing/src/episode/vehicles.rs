@@ -21,7 +21,7 @@ pub(crate) fn brake_lights(vehicle: &Vehicle) -> impl Iterator<Item = [[f32; 2];
 
 /// The colour of a kind of vehicle.
 pub(crate) fn kind(vehicle: &Vehicle) -> &'static str {
-    if vehicle.is_van() { colour::VAN } else { colour::CAR }
+    if vehicle.is_van() || vehicle.is_large() { colour::VAN } else { colour::CAR }
 }
 
 impl Scene<'_> {
@@ -42,9 +42,14 @@ impl Scene<'_> {
         let mut all = self.recording.vehicles.iter().flatten();
         let Some(_) = all.next() else { return Vec::new() };
         let mut entries = vec![Entry::new(Swatch::Area(colour::CAR), format!("car{when}"))];
-        if self.recording.vehicles.iter().flatten().any(Vehicle::is_van) {
-            entries.push(Entry::new(Swatch::Area(colour::VAN), format!("van{when}")));
-        }
+        let has = |is: fn(&Vehicle) -> bool| self.recording.vehicles.iter().flatten().any(is);
+        let larger = match (has(Vehicle::is_van), has(Vehicle::is_large)) {
+            (false, false) => None,
+            (true, false) => Some("van"),
+            (false, true) => Some("bus or truck"),
+            (true, true) => Some("van, bus or truck"),
+        };
+        entries.extend(larger.map(|kinds| Entry::new(Swatch::Area(colour::VAN), format!("{kinds}{when}"))));
         if self.recording.vehicles.iter().flatten().any(|vehicle| vehicle.is_rude) {
             entries.push(Entry::new(Swatch::Line(colour::RUDE, 3.0, ""), "edge of who is rude"));
         }

@@ -137,7 +137,7 @@ impl Again<'_> {
         let truck = &batch.truck[env];
         let network = &traffic.road(self.world, truck.route).network;
         let units = roomy(self.world.rig(truck), truck);
-        let mut cars = Row::of(words).cars.iter().filter(|car| car.is_there()).map(|car| car.outline(network));
+        let mut cars = Row::of(words).cars.iter().filter(|car| car.is_there()).flat_map(|car| car.outlines(network));
         cars.any(|car| units.iter().any(|unit| unit.overlaps(&car)))
     }
 }

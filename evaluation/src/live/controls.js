@@ -98,7 +98,8 @@ function showLegend(app) {
       ...(hasLoads ? [html("li", {}, cross("rolled_over"), "rolled over")] : []),
       ...(traffic ? [html("li", {}, cross("met_vehicle"), "met a vehicle")] : []),
     ]),
-    ...areaKeys([["car", "car", traffic], ["van", "van", traffic?.vans], ["rude", "edge of who is rude", traffic?.rude],
+    ...areaKeys([["car", "car", traffic], ["van", traffic?.trailers ? "van, bus, truck" : "van", traffic?.vans],
+      ["rude", "edge of who is rude", traffic?.rude],
       ["apron", "apron, for trailers alone", roads.some(({ apron }) => apron)]]));
 }
 

@@ -24,7 +24,7 @@ offtrack::shared! {
         pub vehicle: u32,
         /// Steps of the episode.
         pub steps: u32,
-        /// The other vehicle that it met: 0 is none, 1 a car, 2 a van.
+        /// The other vehicle that it met: 0 is none, 1 a car, 2 a van, 3 a bus or a truck.
         pub met: u32,
         /// 1 if its tractor met it, or else its trailer; 2 more if the vehicle was beyond its line.
         pub contact: u32,

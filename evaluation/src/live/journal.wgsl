@@ -19,9 +19,11 @@ fn note_among(thread: Thread) {
     }
     let network = network_of(truck[env].route);
     let car = car_at(env, met - 1u);
-    let by_tractor = are_overlapping(tractor_outline(truck[env]), outline_of(network, car));
+    let tractor = tractor_outline(truck[env]);
+    let by_tractor = is_covering(network, car, tractor, tractor);
     let has_entered = line_of_path(network, path_of(car)) < front_of(car);
-    keep(env, select(1u, 2u, is_van(car)), select(0u, 1u, by_tractor) + select(0u, 2u, has_entered));
+    let kind = select(select(1u, 2u, is_van(car)), 3u, large_of(style_of(car)) != 0u);
+    keep(env, kind, select(0u, 1u, by_tractor) + select(0u, 2u, has_entered));
 }
 
 // Whether an episode failed in this step. One of a truck that is held has ended in an earlier step.

@@ -17,6 +17,11 @@ const VEHICLES = {
   others: ["others", "vehicle_colour", { VERTEX: CARS }],
   around: ["around_followed", "vehicle_colour", { VERTEX: CARS }],
 };
+/** Their trailers, where there may be some. */
+const TRAILERS = {
+  towed: ["trailers", "vehicle_colour", { VERTEX: CARS }],
+  towedAround: ["trailers_around_followed", "vehicle_colour", { VERTEX: CARS }],
+};
 /** Trucks of a crowd whose vehicles are drawn at most; how opaque these are, and the number of trucks on a road from
  * which on they are paler, down to what eight bits of a colour still show. */
 const MOST_AROUND = 8192, OTHERS = 0.6, FEW_OTHERS = 20, LEAST_OTHERS = 0.02;
@@ -87,7 +92,8 @@ class BatchPicture {
     const resources = [made.view, picture.theme, made.places, made.points];
     made.own = picture.device.createBindGroup({ label: "view", layout: picture.own,
       entries: resources.map((resource, binding) => ({ binding, resource: { buffer: resource } })) });
-    const layers = batch.world.facts.traffic ? { ...LAYERS, ...VEHICLES } : LAYERS;
+    const { traffic } = batch.world.facts;
+    const layers = { ...LAYERS, ...(traffic ? VEHICLES : {}), ...(traffic?.trailers ? TRAILERS : {}) };
     await Promise.all(Object.entries(layers).map(async ([name, [, , reads]]) => {
       const visibility = {};
       for (const [stage, names] of Object.entries(reads)) {
@@ -138,14 +144,18 @@ class BatchPicture {
       pass.draw(vertices, instances);
     };
     const isFollowed = followed !== null, hasVehicles = "others" in this.layers;
+    const hasTrailers = "towed" in this.layers;
     if (ground) layer("ground", 6, this.sites.places.length);
-    if (hasVehicles && others) layer("others", 6, code.cars.n * Math.min(n, MOST_AROUND));
+    const slots = code.cars.n * Math.min(n, MOST_AROUND);
+    if (hasVehicles && others) layer("others", 6, slots);
+    if (hasTrailers && others) layer("towed", 6, slots);
     layer("trucks", 18, n);
     layer("crosses", 6, MOST_FAILURES);
     if (!isFollowed) return;
     layer("route", 6, this.sites.mostWaypoints);
     if (1 < this.nPoints) layer("paths", 6, 2 * (this.nPoints - 1));
     if (hasVehicles) layer("around", 6, code.cars.n);
+    if (hasTrailers) layer("towedAround", 6, code.cars.n);
     if (rays) layer("rays", 12, code.n_rays);
     layer("followed", 18, 1);
     layer("wheels", 6, N_WHEELS);

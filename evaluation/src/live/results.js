@@ -10,7 +10,7 @@ const endNames = (live, { facts }) => live.facts.code.ended.filter((name) =>
 
 /** Which vehicle a failure met, by which unit and where; nothing if it met none. */
 const metWords = ({ met, contact }) => (met === 0 ? "" : `${contact & 1 ? "tractor" : "trailer"} on a ${
-  met === 2 ? "van" : "car"} ${contact & 2 ? "beyond" : "before"} its line`);
+  ["car", "van", "bus or truck"][met - 1]} ${contact & 2 ? "beyond" : "before"} its line`);
 
 /** The evaluation of a policy on a benchmark that is reported, of the split that is driven if there is one. */
 function reportedOf(policy, world, split) {

@@ -28,23 +28,36 @@ struct Vehicle {
 // The vehicles around the trucks of the crowd: an instance a slot.
 @vertex
 fn others(@builtin(vertex_index) vertex: u32, @builtin(instance_index) index: u32) -> Vehicle {
-    return vehicle(vertex, index / N_CARS, index % N_CARS, view.others);
+    return vehicle(vertex, index / N_CARS, index % N_CARS, view.others, false);
 }
 
 // Those around the truck that is followed.
 @vertex
 fn around_followed(@builtin(vertex_index) vertex: u32, @builtin(instance_index) slot: u32) -> Vehicle {
-    return vehicle(vertex, view.followed, slot, 1.0);
+    return vehicle(vertex, view.followed, slot, 1.0, false);
 }
 
-// The vehicle in a slot of a truck's row, moved on by the time since the last step.
-fn vehicle(vertex: u32, env: u32, slot: u32, alpha: f32) -> Vehicle {
+// The trailers of both.
+@vertex
+fn trailers(@builtin(vertex_index) vertex: u32, @builtin(instance_index) index: u32) -> Vehicle {
+    return vehicle(vertex, index / N_CARS, index % N_CARS, view.others, true);
+}
+
+@vertex
+fn trailers_around_followed(@builtin(vertex_index) vertex: u32, @builtin(instance_index) slot: u32) -> Vehicle {
+    return vehicle(vertex, view.followed, slot, 1.0, true);
+}
+
+// The vehicle in a slot of a truck's row, or its trailer, moved on by the time since the last step.
+fn vehicle(vertex: u32, env: u32, slot: u32, alpha: f32, is_trailer: bool) -> Vehicle {
     var car = car_at(env, slot);
-    if !is_there(car) || truck[env].held == 1u {
+    if !is_there(car) || truck[env].held == 1u || (is_trailer && !has_trailer(car)) {
         return Vehicle(unseen().position, vec2<f32>(0.0), vec2<f32>(0.0), vec4<f32>(0.0), vec4<f32>(0.0), 0u);
     }
     car.station += i32(speed_of(car) * view.since * STATE_METRE);
-    let outline = outline_of(network_of(truck[env].route), car);
+    let network = network_of(truck[env].route);
+    var outline = outline_of(network, car);
+    if is_trailer { outline = trailer_of(network, car); }
     let half = vec2<f32>(outline.half_length, outline.half_width);
     let local = SQUARE[vertex] * (half + view.pixel);
     let p = sites[truck[env].route].offset + outline.middle + rotated(outline.along, local);
@@ -54,7 +67,7 @@ fn vehicle(vertex: u32, env: u32, slot: u32, alpha: f32) -> Vehicle {
         on_screen(p),
         local,
         half,
-        vec4<f32>(select(theme.car.rgb, theme.van.rgb, is_van(car)), alpha),
+        vec4<f32>(select(theme.car.rgb, theme.van.rgb, is_van(car) || large_of(style_of(car)) != 0u), alpha),
         vec4<f32>(select(theme.panel.rgb, theme.rude.rgb, is_rude), select(EDGE, RUDE_EDGE, is_rude)),
         u32(brakes),
     );

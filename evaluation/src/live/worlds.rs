@@ -70,11 +70,13 @@ pub(super) fn printed(ground: &Ground, policies: &[&Policy], packed: &mut Packed
 /// table of lanes and the words of each demand; nothing where there are no vehicles.
 fn traffic(Ground { scenario, world, .. }: &Ground) -> Value {
     let (Some(of), Some(shared)) = (&scenario.traffic, &world.traffic) else { return Value::Null };
+    let has_large = of.large.iter().any(|&fraction| 0.0 < fraction);
     json!({
         "demand": of.demand,
         "levels": levels(world),
         "observed": shared.is_observed,
-        "vans": 0.0 < of.vans,
+        "vans": 0.0 < of.vans || has_large,
+        "trailers": has_large,
         "rude": 0.0 < of.rude[1],
     })
 }

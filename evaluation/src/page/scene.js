@@ -90,7 +90,7 @@ function drawOthers(context, others, pixel, colourOf) {
     within(context, x, y, heading, () => {
       context.beginPath();
       context.roundRect(-length / 2, -width / 2, length, width, 0.3);
-      context.fillStyle = colourOf(length < 6 ? "car" : "van");
+      context.fillStyle = colourOf(length < 6 && width < 2.3 ? "car" : "van");
       context.fill();
       context.lineWidth = (rude ? 2.5 : 1) * pixel;
       context.strokeStyle = colourOf(rude ? "rude" : "panel");

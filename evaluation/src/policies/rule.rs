@@ -120,8 +120,9 @@ impl Rule {
             speed = speed.min(if distance < 0.3 { 0.0 } else { (2.0 * BRAKING * distance).sqrt().max(least) });
         }
         for car in cars() {
-            let outline = car.outline(network);
-            speed = speed.min(behind(network, &view, truck.speed, car, &outline)).min(beside(&view, &outline));
+            for outline in car.outlines(network) {
+                speed = speed.min(behind(network, &view, truck.speed, car, &outline)).min(beside(&view, &outline));
+            }
         }
         speed.max(0.0)
     }

@@ -1,7 +1,7 @@
 //! The other vehicles of a recording.
 
 use glam::Vec2;
-use offtrack::layout::N_CARS;
+use offtrack::layout::{MOST_IN_GROUP, N_CARS};
 use offtrack::simulator::Batch;
 use offtrack::traffic::car::Outline;
 use offtrack::traffic::{Row, outlines};
@@ -14,11 +14,15 @@ use super::{ANGLE, MILLI, to};
 pub const BRAKES: f32 = -0.6;
 /// From this length on it is a van (m).
 const VAN: f32 = 6.0;
+/// From this width on it is a bus or a truck, or one of its units (m).
+const LARGE: f32 = 2.3;
+/// Behind the slots of cars and of the units of trucks stand the trailers of cars' slots.
+const TRAILERS: usize = N_CARS + 2 * MOST_IN_GROUP;
 
 /// Another vehicle after one step.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Vehicle {
-    /// Its slot: one that stays is in the same slot.
+    /// Its slot: one that stays is in the same slot. A trailer has one of its own.
     pub slot: usize,
     /// Its middle (m).
     pub position: [f32; 2],
@@ -42,9 +46,10 @@ impl Vehicle {
         let (Some(shared), Some(words)) = (&world.traffic, batch.cars.get(env)) else { return Vec::new() };
         let network = &shared.road(world, batch.truck[env].route).network;
         let there = Row::of(words).cars.iter().enumerate().filter(|(_, car)| car.is_there());
-        let vehicle = |(slot, car): (usize, &offtrack::traffic::Car)| {
-            let state = [car.speed(), car.acceleration()];
-            Vehicle { is_rude: car.is_rude(), ..Vehicle::of(slot, car.outline(network), state) }
+        let vehicles = |(slot, car): (usize, &offtrack::traffic::Car)| {
+            let (state, is_rude) = ([car.speed(), car.acceleration()], car.is_rude());
+            let units = car.outlines(network).zip([slot, TRAILERS + slot]);
+            units.map(move |(outline, slot)| Vehicle { is_rude, ..Vehicle::of(slot, outline, state) })
         };
         // Behind the slots of cars stand the other trucks of a group, two units each.
         let first = env - env % batch.group();
@@ -55,7 +60,7 @@ impl Vehicle {
             let of = move |(unit, outline)| Vehicle::of(slot + unit, outline, [truck.speed, truck.acceleration]);
             outlines(world.rig(truck), truck).into_iter().enumerate().map(of)
         });
-        there.map(vehicle).chain(units).collect()
+        there.flat_map(vehicles).chain(units).collect()
     }
 
     /// What covers this ground, at a speed and an acceleration (m/s, m/s²).
@@ -80,7 +85,12 @@ impl Vehicle {
 
     /// Whether it is a van.
     pub fn is_van(&self) -> bool {
-        VAN < self.length
+        VAN < self.length && !self.is_large()
+    }
+
+    /// Whether it is a bus or a truck, or a unit of one.
+    pub fn is_large(&self) -> bool {
+        LARGE < self.width
     }
 
     /// The vehicle in the mirror image of its world.

@@ -88,18 +88,22 @@ struct Other {
     speed: f32,
     /// Its length (m).
     length: f32,
-    /// The ground that it covers; a car is one unit.
+    /// The ground that it covers; most cars are one unit.
     units: [Option<Outline>; 2],
+    /// Whether it is no truck of the group.
+    is_car: bool,
 }
 
 impl Other {
     fn car(network: &Network, car: &Car) -> Other {
+        let mut units = car.outlines(network);
         Other {
             path: car.path(),
             station: car.station(),
             speed: car.speed(),
             length: car.length(),
-            units: [Some(car.outline(network)), None],
+            units: [units.next(), units.next()],
+            is_car: true,
         }
     }
 
@@ -111,6 +115,7 @@ impl Other {
             speed: mate.truck.speed,
             length: metres(stretched(rig)),
             units: outlines(rig, &mate.truck).map(Some),
+            is_car: false,
         }
     }
 
@@ -126,7 +131,7 @@ impl Other {
 
 /// Most vehicles around a truck, and most units of them: other trucks have two.
 const N_OTHERS: usize = N_CARS + MOST_IN_GROUP - 1;
-const N_UNITS: usize = N_CARS + 2 * (MOST_IN_GROUP - 1);
+const N_UNITS: usize = 2 * N_OTHERS;
 
 /// The vehicles around a truck.
 type Others = [Option<Other>; N_OTHERS];
@@ -202,7 +207,7 @@ impl Observing<'_> {
     /// The zones of the truck's path with that of another vehicle.
     fn zones(&self, other: &Other) -> impl Iterator<Item = Meeting> {
         self.network.zones_of(self.path, other.path).iter().map(|zone| {
-            let Stretch { a_in, a_out, b_in, b_out, delta, kind } = zone.stretch();
+            let Stretch { a_in, a_out, b_in, b_out, delta, kind, .. } = zone.stretch();
             Meeting { own: [a_in, a_out].map(metres), its: [b_in, b_out].map(metres), delta: metres(delta), kind }
         })
     }
@@ -270,10 +275,17 @@ impl Observing<'_> {
         let distance = |outline: &Outline| {
             self.units.iter().map(|unit| unit.distance_squared(outline.middle)).fold(f32::INFINITY, f32::min).sqrt()
         };
-        let of_other = |other| Other::units(other).map(move |unit| (unit, other.speed));
-        let units = others.iter().flatten().flat_map(of_other).enumerate();
+        // Trailers of cars stand behind all other units.
+        let number = |index: usize, unit: usize, other: &Other| {
+            2 * index + unit + if other.is_car && unit == 1 { N_UNITS } else { 0 }
+        };
+        let of_other = |(index, other)| {
+            let numbered = Other::units(other).enumerate();
+            numbered.map(move |(unit, outline)| (number(index, unit, other), outline, other.speed))
+        };
+        let units = others.iter().flatten().enumerate().flat_map(of_other);
         let mut near = [None; N_UNITS];
-        for ((number, (unit, speed)), place) in units.zip(&mut near) {
+        for ((number, unit, speed), place) in units.zip(&mut near) {
             *place = Some((distance(unit), number, unit, speed)).filter(|&(distance, ..)| distance < NEAR_SCALE);
         }
         // Of two that are as near the one in the lower slot is first.

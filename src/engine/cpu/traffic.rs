@@ -198,8 +198,8 @@ fn clear(world: &World, shared: &Traffic, truck: &Truck, progress: &Progress, ro
         road.network.paths[car.path()].source == source && 0.0 <= room && room < ROOM_ALONG + stops
     };
     for car in row.cars.iter_mut().filter(|car| car.is_there()) {
-        let outline = car.outline(&road.network);
-        if is_too_near_ahead(car) || units.iter().any(|unit| unit.overlaps(&outline)) {
+        let is_beside = |car: &Car| car.outlines(&road.network).any(|its| units.iter().any(|unit| unit.overlaps(&its)));
+        if is_too_near_ahead(car) || is_beside(car) {
             *car = Car::NONE;
         }
     }

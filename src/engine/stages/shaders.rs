@@ -6,7 +6,7 @@ pub fn module() -> String {
 }
 
 /// The shader files in the order in which they make one module.
-pub const SHADERS: [(&str, &str); 27] = [
+pub const SHADERS: [(&str, &str); 28] = [
     ("layout", include_str!("../../../shaders/layout.wgsl")),
     ("common/thread", include_str!("../../../shaders/common/thread.wgsl")),
     ("common/angle", include_str!("../../../shaders/common/angle.wgsl")),
@@ -18,6 +18,7 @@ pub const SHADERS: [(&str, &str); 27] = [
     ("steer", include_str!("../../../shaders/steer.wgsl")),
     ("drive", include_str!("../../../shaders/drive.wgsl")),
     ("traffic/cars", include_str!("../../../shaders/traffic/cars.wgsl")),
+    ("traffic/large", include_str!("../../../shaders/traffic/large.wgsl")),
     ("traffic/driver", include_str!("../../../shaders/traffic/driver.wgsl")),
     ("traffic/truck", include_str!("../../../shaders/traffic/truck.wgsl")),
     ("traffic/contact", include_str!("../../../shaders/traffic/contact.wgsl")),

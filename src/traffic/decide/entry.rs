@@ -3,6 +3,7 @@
 use super::{Driver, LEAST_SPEED, Seen};
 use crate::layout::shared::constants;
 use crate::traffic::bake::ENTRY;
+use crate::traffic::large::LAG_OF_LARGE;
 use crate::traffic::model::{time, way_of_a_second};
 use crate::traffic::network::{Kind, Stretch};
 use crate::traffic::rules::TIME_PARTS;
@@ -68,7 +69,7 @@ impl Driver<'_> {
                 self.stops |= to_line + GONE_BEFORE < time(left, other.speed.max(LEAST_CROSSING));
             }
             Kind::Follow => {
-                let rear = other.station - zone.delta - other.length;
+                let rear = zone.beside(other.station - other.length);
                 // It foresees how far one that passes moves away.
                 let soon = rear - me.station + way_of_a_second((other.speed - me.speed).max(0));
                 self.stop_or_follow(me.line - me.station, soon, other.speed);
@@ -85,10 +86,12 @@ impl Driver<'_> {
     /// Time that this car leaves between itself and ring traffic that comes (1/256 step).
     pub fn lag(&self, kind: Kind) -> i32 {
         let rules = self.crowd.rules;
-        let crosses = 0 < self.crowd.network.paths[self.path].clear;
+        let [_, clear] = self.crowd.network.line_of(self.car());
+        let crosses = 0 < clear;
         let lane = self.crowd.network.source_of(self.path).lane.min(1) as usize;
         let lag = if kind == Kind::Soft { rules.soft_lags[lane] } else { rules.lags[usize::from(crosses)] };
         let patience = (IMPATIENCE - self.me.standing as i32).max(LEAST_PATIENCE);
+        let lag = lag + if self.car().large().is_some() { LAG_OF_LARGE } else { 0 };
         lag * (TIME_PARTS - self.temperament) * patience / (TIME_PARTS * IMPATIENCE)
     }
 
@@ -107,8 +110,8 @@ impl Driver<'_> {
     /// Stops before the line where there is no room behind the lanes that this car crosses.
     pub(super) fn keep_crossed_lanes_clear(&mut self) {
         let (me, (rear, speed)) = (&self.me, self.leader);
-        let path = &self.crowd.network.paths[self.path];
-        let would_block = rear - self.crowd.rules.gap - me.length < path.clear && me.line < rear;
+        let [_, clear] = self.crowd.network.line_of(self.car());
+        let would_block = rear - self.crowd.rules.gap - me.length < clear && me.line < rear;
         self.stops |= me.waits && would_block && speed < SLOW;
     }
 }

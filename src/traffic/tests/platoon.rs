@@ -42,6 +42,7 @@ fn straight() -> Network {
         pairs: vec![Pair { first: 0, n: 1, n_all: 1, a: [0, 255], b: [0, 255] }],
         zones: vec![Zone { a: [0, u16::MAX], b: [0, u16::MAX], delta: 0, kind: 0 }],
         sources: vec![Source { entry: 0, lane: 0, first: 0, n: 1 }],
+        large: None,
     }
 }
 

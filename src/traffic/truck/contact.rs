@@ -22,6 +22,8 @@ constants! {
     /// No part of a car is farther from the sample behind its front, and no corner of a unit from the end of its axis
     /// (m).
     const NEAR_CAR: f32 = 12.0;
+    /// So much farther those of a large vehicle may be (m).
+    pub(super) const LONGER_THAN_CAR: f32 = 12.0;
     /// Below this speed a car stands, and hits nobody (2^-14 m a step).
     const HITS_NOBODY: i32 = speed(0.05);
 
@@ -84,13 +86,17 @@ pub fn touched(network: &Network, own: &Met, cars: &[Car]) -> Option<Contact> {
     let [tractor, trailer] = now;
     let middle = 0.5 * (tractor.middle + trailer.middle);
     let reach = 0.5 * tractor.middle.distance(trailer.middle) + tractor.half_length.max(trailer.half_length) + NEAR_CAR;
-    let is_near = |car: &Car| front(network, car).distance_squared(middle) < reach * reach;
+    let is_near = |car: &Car| {
+        let reach = reach + if car.large().is_some() { LONGER_THAN_CAR } else { 0.0 };
+        front(network, car).distance_squared(middle) < reach * reach
+    };
     let near = cars.iter().enumerate().filter(|(_, car)| car.is_there() && is_near(car));
     let contacts = near.filter_map(|(slot, car)| {
-        let outline = car.outline(network);
-        now.iter().any(|unit| unit.overlaps(&outline)).then(|| Contact {
-            slot,
-            is_trucks_fault: !is_cars_fault(network, &outlines_before(rig, truck), *entry, car, &outline),
+        let touches =
+            |units: &[Outline; 2]| car.outlines(network).any(|its| units.iter().any(|unit| unit.overlaps(&its)));
+        touches(&now).then(|| {
+            let was_there = || touches(&outlines_before(rig, truck));
+            Contact { slot, is_trucks_fault: !is_cars_fault(network, was_there, *entry, car) }
         })
     });
     contacts.min_by_key(Contact::order)
@@ -112,21 +118,20 @@ pub fn touched_by(own: &Met, other: &Met, index: usize) -> Option<Contact> {
     Some(Contact { slot: N_CARS + index, is_trucks_fault: !is_its_fault })
 }
 
-/// Whether the car is at fault of a contact with a truck that covered this ground a second ago.
+/// Whether the car is at fault of a contact with a truck that was or was not where the car is a second ago.
 ///
 /// Who moved in the last step tells nothing: in 0.1 s both do. A car is at fault if it moves, and either the truck was
 /// there a second ago, or the car has entered lately before a truck that drives in the ring. A truck that has entered
 /// lately itself is at fault in any case, and so it is otherwise.
-fn is_cars_fault(network: &Network, before: &[Outline; 2], entry: Entry, car: &Car, outline: &Outline) -> bool {
+fn is_cars_fault(network: &Network, was_there: impl FnOnce() -> bool, entry: Entry, car: &Car) -> bool {
     let has_entered_lately = entry.steps.is_some_and(|steps| steps < LATELY);
-    let was_there = before.iter().any(|unit| unit.overlaps(outline));
-    let behind_line = car.front() - network.paths[car.path()].line;
+    let behind_line = car.front() - network.line_of(car)[0];
     // 2^-14 m a step for some steps.
     let lately = FROM_STANDING.max((LATELY.cast_signed() * car.pace()) >> 4);
     let cuts_in = entry.steps.is_some()
         && network.source_of(car.path()).entry != entry.arm
         && (1..=lately).contains(&behind_line);
-    HITS_NOBODY < car.pace() && !has_entered_lately && (was_there || cuts_in)
+    HITS_NOBODY < car.pace() && !has_entered_lately && (cuts_in || was_there())
 }
 
 /// The ground that both units covered a second ago, each driven back along its circle.

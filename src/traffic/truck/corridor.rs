@@ -3,6 +3,7 @@
 
 use glam::Vec2;
 
+use super::contact::LONGER_THAN_CAR;
 use super::view::View;
 use crate::layout::shared::constants;
 use crate::traffic::car::Outline;
@@ -46,14 +47,24 @@ const REACH: f32 = CORRIDOR_SAMPLES as f32 * SPACING;
 struct Points {
     x: [f32; CORRIDOR_SAMPLES],
     y: [f32; CORRIDOR_SAMPLES],
+    /// Half the width that the car needs there (m).
+    half_widths: [f32; CORRIDOR_SAMPLES],
 }
 
 impl Points {
-    /// Points of samples; of those that there are not, points that are near nothing.
-    fn of(samples: &[Sample]) -> Points {
-        let mut points = Points { x: [1e9; CORRIDOR_SAMPLES], y: [1e9; CORRIDOR_SAMPLES] };
+    /// Points of the samples of a car's path from one on; of those that there are not, points that are near nothing.
+    /// Those of a large vehicle are in the middle of what it sweeps.
+    fn of(network: &Network, car: &Car, first: usize, samples: &[Sample]) -> Points {
+        let (nowhere, half_widths) = ([1e9; CORRIDOR_SAMPLES], [car.half_width(); CORRIDOR_SAMPLES]);
+        let mut points = Points { x: nowhere, y: nowhere, half_widths };
         for (index, sample) in samples.iter().take(CORRIDOR_SAMPLES).enumerate() {
-            (points.x[index], points.y[index]) = sample.position.into();
+            let mut position = sample.position;
+            if let Some(kind) = car.large() {
+                let (left, half_width) = network.band(car.path(), first + index, kind);
+                position += left * sample.direction.perp();
+                points.half_widths[index] = half_width;
+            }
+            (points.x[index], points.y[index]) = position.into();
         }
         points
     }
@@ -87,10 +98,10 @@ pub(super) fn mind(view: &View, driver: &mut Driver) {
         return;
     }
     let samples = corridor(network, &car, first);
-    let points = Points::of(samples);
+    let points = Points::of(network, &car, first, samples);
     let station = |index: usize| (first + index) as f32 * SPACING;
-    let room =
-        |index: usize| car.half_width() + if station(index) < car.station() { ROOM_AT_FRONT } else { CORRIDOR_ROOM };
+    let beside = |index: usize| if station(index) < car.station() { ROOM_AT_FRONT } else { CORRIDOR_ROOM };
+    let room = |index: usize| points.half_widths[index] + beside(index);
     let now = points.to_nearest(&view.now, at_front);
     let leader = (0..samples.len()).find(|&index| now[index] < room(index) * room(index));
     if let Some(index) = leader {
@@ -106,9 +117,9 @@ pub(super) fn mind(view: &View, driver: &mut Driver) {
     }
     if !view.waits && !car.is_rude() {
         let later = points.to_nearest(&view.later, at_front);
-        let beside = car.half_width() + ROOM_LATER;
+        let room = |index: usize| points.half_widths[index] + ROOM_LATER;
         let before = leader.unwrap_or(samples.len());
-        if let Some(index) = later[..before].iter().position(|&squared| squared < beside * beside) {
+        if let Some(index) = (0..before).find(|&index| later[index] < room(index) * room(index)) {
             slow(view, driver, length(station(index) - BEFORE_SAMPLE));
         }
     }
@@ -129,17 +140,19 @@ fn slow(view: &View, driver: &mut Driver, rear: i32) {
 
 /// Whether a car is about to touch a truck, with its front near a point.
 fn touches_soon(view: &View, network: &Network, car: &Car, front: Vec2) -> bool {
-    if !view.now.iter().any(|unit| unit.distance_squared(front) < NEAR_UNIT * NEAR_UNIT) {
+    let near = NEAR_UNIT + if car.large().is_some() { LONGER_THAN_CAR } else { 0.0 };
+    if !view.now.iter().any(|unit| unit.distance_squared(front) < near * near) {
         return false;
     }
     // A station's unit is half of a speed's way in a step.
-    let soon = Car { station: car.station + 2 * CAR_STEPS_AHEAD * car.speed + MORE_AHEAD, ..*car }.outline(network);
+    let soon = Car { station: car.station + 2 * CAR_STEPS_AHEAD * car.speed + MORE_AHEAD, ..*car };
     let grown = |unit: &Outline| Outline {
         half_length: unit.half_length + LEAST_ROOM,
         half_width: unit.half_width + LEAST_ROOM,
         ..*unit
     };
-    view.now.iter().any(|unit| soon.overlaps(&grown(unit)))
+    let now = view.now.each_ref().map(grown);
+    soon.outlines(network).any(|its| now.iter().any(|unit| its.overlaps(unit)))
 }
 
 /// Where a truck stands nearest on the first part of a car's path: station of its rear, and its speed there (2^-10 m,
@@ -149,9 +162,10 @@ pub(super) fn ahead(view: &View, network: &Network, car: &Car) -> Option<(i32, i
         return None;
     }
     let samples = corridor(network, car, 0);
-    let beside = car.half_width() + CORRIDOR_ROOM;
-    let now = Points::of(samples).to_nearest(&view.now, samples[0].position);
-    let index = now[..samples.len()].iter().position(|&squared| squared < beside * beside)?;
+    let points = Points::of(network, car, 0, samples);
+    let now = points.to_nearest(&view.now, samples[0].position);
+    let room = |index: usize| points.half_widths[index] + CORRIDOR_ROOM;
+    let index = (0..samples.len()).find(|&index| now[index] < room(index) * room(index))?;
     let speed = speed(view.velocity.dot(samples[index].direction).max(0.0));
     Some((length(index as f32 * SPACING - BEFORE_SAMPLE), speed))
 }

@@ -48,6 +48,6 @@ fn is_in_the_way(view: &View, driver: &Driver, zone: &Stretch) -> bool {
         Kind::Soft | Kind::Wide => true,
         Kind::Cross => to_line + GONE_BEFORE < time((zone.b_out - rear).max(0), view.speed.max(LEAST_CROSSING)),
         // Once its rear has passed, it is followed as what is in the corridor.
-        Kind::Follow => rear - zone.delta < zone.a_in,
+        Kind::Follow => zone.beside(rear) < zone.a_in,
     }
 }

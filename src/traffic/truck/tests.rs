@@ -80,8 +80,7 @@ fn beside(network: &Network, view: View, car: Car) -> [f32; 2] {
 
 /// Whether a car touches the truck's ground.
 fn touches(network: &Network, view: &View, car: &Car) -> bool {
-    let outline = car.outline(network);
-    view.now.iter().any(|unit| unit.overlaps(&outline))
+    car.outlines(network).any(|its| view.now.iter().any(|unit| unit.overlaps(&its)))
 }
 
 /// Drives a car for some steps beside a truck that stands; whether it never touched it, and the car then.

@@ -11,7 +11,8 @@ use offtrack::world::World;
 
 use super::states::put;
 use super::vehicles::{
-    N_ENVS, after, assert_untouched, batch_anywhere, of_networks, of_traffic, rows, simulators, wrong_device,
+    N_ENVS, after, assert_untouched, batch_anywhere, large_world, of_networks, of_traffic, rows, simulators,
+    wrong_device,
 };
 use crate::traffic::with_traffic;
 
@@ -61,6 +62,11 @@ const OFF: [Off; 8] = [
 
 #[test]
 fn what_is_observed_of_any_vehicles_is_alike_on_either_engine_and_every_number_of_it_counts() {
+    let of_large = large_world();
+    let [mut cpu, mut device] = simulators(&of_large);
+    let before = batch_anywhere(&of_large, &cpu);
+    let [here, there] = [&mut cpu, &mut device].map(|simulator| after(simulator, Stage::Observe, &before));
+    assert_alike("observe large vehicles", &here.next_around, &there.next_around);
     let world = world();
     let [mut cpu, mut device] = simulators(&world);
     let before = batch_anywhere(&world, &cpu);

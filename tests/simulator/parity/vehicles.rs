@@ -8,7 +8,7 @@ use offtrack::layout::random::{index_below, words};
 use offtrack::layout::{Column, Ended, N_CARS};
 use offtrack::simulator::{Batch, Engine, RouteChoice, Simulator};
 use offtrack::traffic::units::{length, speed};
-use offtrack::traffic::{Car, Network, Row};
+use offtrack::traffic::{Car, LargeTables, Network, Row};
 use offtrack::world::{Traffic, World};
 
 use super::states::put;
@@ -24,6 +24,14 @@ const STEPS: usize = 40;
 fn world() -> Arc<World> {
     let keys = "demand = [900, 2100]\nvans = 0.25\nrude = [0.0, 0.3]\ncourtesy = 0.3\nhindrance = -2.0\n";
     let mut world = World::clone(&with_traffic(&format!("{keys}drivers = \"distracted\"\n")).1);
+    world.params.start_along = 1.0;
+    Arc::new(world)
+}
+
+/// The same with buses, rigid trucks and tractor-trailers among them.
+pub fn large_world() -> Arc<World> {
+    let keys = "vans = 0.2\nrude = 0.1\nbuses = 0.1\nrigid_trucks = 0.1\ntractor_trailers = 0.2\n[observation]\n";
+    let mut world = World::clone(&with_traffic(&format!("demand = [900, 2100]\n{keys}vehicles = true\n")).1);
     world.params.start_along = 1.0;
     Arc::new(world)
 }
@@ -57,7 +65,8 @@ fn anywhere(world: &World, batch: &mut Batch) {
     let traffic = world.traffic.as_ref().unwrap();
     for (env, words_of_row) in batch.cars.iter_mut().enumerate() {
         let truck = &mut batch.truck[env];
-        let paths = &traffic.road(world, truck.route).network.paths;
+        let network = &traffic.road(world, truck.route).network;
+        let (paths, styles) = (&network.paths, if network.large.is_some() { 1023 } else { 255 });
         let row = Row::of_mut(words_of_row);
         let drawn = |draw: u32| words(3, env as u32, 0, draw);
         let [level, first, second, steps] = drawn(0);
@@ -79,10 +88,10 @@ fn anywhere(world: &World, batch: &mut Batch) {
             let station = line + length(45.0) * (at & 0xffff).cast_signed() / 0xffff - length(20.0);
             let is_standing = fast >> 30 == 0;
             *car = Car {
-                station: (station.clamp(length(7.0), paths[path as usize].length - 1) << 10)
+                station: (station.clamp(length(20.0), paths[path as usize].length - 1) << 10)
                     + (fast & 1023).cast_signed(),
                 speed: if is_standing { 0 } else { index_below(fast << 2, speed(11.0) as u32).cast_signed() << 5 },
-                what: path | (style >> 8 & 255) << 10 | if is_standing { (style >> 18 & 127) << 20 } else { 0 },
+                what: path | (style >> 8 & styles) << 10 | if is_standing { (style >> 18 & 127) << 20 } else { 0 },
                 acceleration: (at >> 16).cast_signed() % 40_000 - 30_000,
             };
         }
@@ -120,9 +129,12 @@ pub fn assert_untouched(before: &Batch, after: &Batch, written: &[Column]) {
 
 #[test]
 fn vehicles_without_a_truck_near_them_drive_alike_on_either_engine_to_the_last_bit_from_any_state() {
-    let world = world();
-    let [mut cpu, mut device] = simulators(&world);
-    let mut before = batch_anywhere(&world, &cpu);
+    [world(), large_world()].iter().for_each(assert_alike_without_trucks);
+}
+
+fn assert_alike_without_trucks(world: &Arc<World>) {
+    let [mut cpu, mut device] = simulators(world);
+    let mut before = batch_anywhere(world, &cpu);
     for (truck, progress) in before.truck.iter_mut().zip(&mut before.progress) {
         let waypoints = world.route_waypoints(truck.route);
         (truck.position, truck.speed) = (waypoints[0].position - 2000.0 * waypoints[0].direction, 0.0);
@@ -136,9 +148,12 @@ fn vehicles_without_a_truck_near_them_drive_alike_on_either_engine_to_the_last_b
 
 #[test]
 fn vehicles_beside_a_truck_drive_alike_on_either_engine_but_where_its_ground_is_a_last_bit_off() {
-    let world = world();
-    let [mut cpu, mut device] = simulators(&world);
-    let before = batch_anywhere(&world, &cpu);
+    [world(), large_world()].iter().for_each(assert_alike_beside_trucks);
+}
+
+fn assert_alike_beside_trucks(world: &Arc<World>) {
+    let [mut cpu, mut device] = simulators(world);
+    let before = batch_anywhere(world, &cpu);
     let [here, there] = [&mut cpu, &mut device].map(|simulator| driven(simulator, &before, 2));
     let (mut alone, mut slowing, mut unlike, mut far, mut otherwise) = (0, 0, 0, 0, 0);
     for (here, there) in rows(&here).zip(rows(&there)) {
@@ -189,6 +204,27 @@ const OFF: [Off; 16] = [
     ("ground of a truck", |world| world.rigs.iter_mut().for_each(|rig| rig.trailer_body.half_width += 0.05)),
 ];
 
+/// The same of large vehicles.
+const OFF_LARGE: [Off; 6] = [
+    ("line of a large vehicle", |world| of_large(world, |large| large.lines.iter_mut().for_each(|line| line[0] += 64))),
+    ("clear", |world| of_large(world, |large| large.lines.iter_mut().for_each(|line| line[1] += 4096))),
+    ("fits", |world| of_large(world, |large| large.fits.fill(0))),
+    ("band", |world| {
+        of_large(world, |large| large.bands.iter_mut().flatten().for_each(|band| band.left += 512));
+    }),
+    ("trail", |world| {
+        of_large(world, |large| large.trails.iter_mut().flatten().for_each(|trail| trail.offset += 512));
+    }),
+    ("zone of a large vehicle", |world| {
+        of_large(world, |large| large.zones.iter_mut().for_each(|zone| zone.b[0] += 1))
+    }),
+];
+
+fn of_large(world: &mut World, change: fn(&mut LargeTables)) {
+    let roads = &mut world.traffic.as_mut().unwrap().roads;
+    roads.iter_mut().for_each(|road| change(road.network.large.as_mut().unwrap()));
+}
+
 pub fn of_traffic(world: &mut World, change: fn(&mut Traffic)) {
     change(world.traffic.as_mut().unwrap());
 }
@@ -199,21 +235,25 @@ pub fn of_networks(world: &mut World, change: fn(&mut Network)) {
 
 #[test]
 fn every_number_of_the_vehicles_counts_on_the_device() {
-    let world = world();
-    let mut device = on(&engine(), &world);
-    let before = batch_anywhere(&world, &device);
-    let right = driven(&mut device, &before, STEPS);
-    for (name, change) in OFF {
-        let wrong = driven(&mut wrong_device(&world, change), &before, STEPS);
-        assert!(n_alike(&wrong, &right) < N_ENVS, "{name}");
+    for (world, off) in [(world(), &OFF[..]), (large_world(), &OFF_LARGE)] {
+        let mut device = on(&engine(), &world);
+        let before = batch_anywhere(&world, &device);
+        let right = driven(&mut device, &before, STEPS);
+        for (name, change) in off {
+            let wrong = driven(&mut wrong_device(&world, *change), &before, STEPS);
+            assert!(n_alike(&wrong, &right) < N_ENVS, "{name}");
+        }
     }
 }
 
 #[test]
 fn a_truck_touches_the_same_vehicles_on_either_engine_by_the_same_fault() {
-    let world = world();
-    let [mut cpu, mut device] = simulators(&world);
-    let before = batch_anywhere(&world, &cpu);
+    [world(), large_world()].iter().for_each(assert_touches_alike);
+}
+
+fn assert_touches_alike(world: &Arc<World>) {
+    let [mut cpu, mut device] = simulators(world);
+    let before = batch_anywhere(world, &cpu);
     let here = after(&mut cpu, Stage::Collide, &before);
     let there = after(&mut device, Stage::Collide, &before);
     let n = |is: fn(u32) -> bool| rows(&here).filter(|row| is(row.met)).count();
@@ -222,7 +262,7 @@ fn a_truck_touches_the_same_vehicles_on_either_engine_by_the_same_fault() {
     println!("{by_car} {by_truck}, {alike} alike");
     assert!(20 < by_car && 50 < by_truck && 500 * (N_ENVS - alike) <= N_ENVS, "{by_car} {by_truck}, {alike} alike");
     [&here, &there].iter().for_each(|after| assert_untouched(&before, after, &[Column::Cars, Column::Clearance]));
-    let mut wrong = wrong_device(&world, |world| world.rigs[0].fifth_wheel += 1.0);
+    let mut wrong = wrong_device(world, |world| world.rigs[0].fifth_wheel += 1.0);
     assert!(n_alike(&here, &after(&mut wrong, Stage::Collide, &before)) < alike - 5);
 }
 

@@ -198,7 +198,7 @@ fn the_page_says_among_how_many_vehicles_a_truck_drives_what_it_observes_of_them
         let contact = Contact::from_code(row.met).map(|contact| {
             let network = &world.traffic.as_ref().unwrap().road(world, truck.route).network;
             let car = &row.cars[contact.slot];
-            let by_tractor = outlines(world.rig(truck), truck)[0].overlaps(&car.outline(network));
+            let by_tractor = car.outlines(network).any(|its| outlines(world.rig(truck), truck)[0].overlaps(&its));
             let has_entered = network.paths[car.path()].line() < car.station();
             (1 + u64::from(6.0 < car.length()), u64::from(by_tractor) + 2 * u64::from(has_entered))
         });

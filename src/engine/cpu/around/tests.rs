@@ -13,7 +13,7 @@ fn baked(road: &str) -> Network {
 
 /// What is on a road a minute after it was empty, and each half second from then on.
 fn crowds(network: &Network, demand: f64, n: usize, mut look: impl FnMut([Car; N_CARS])) {
-    let demand = Demand::new(network, &Demand::even(network, demand), Mix { vans: 0.25, rude: 0.0 }).unwrap();
+    let demand = Demand::new(network, &Demand::even(network, demand), Mix { vans: 0.25, ..Mix::default() }).unwrap();
     let mut run = Run::new(network, &Rules::FITTED, &demand, N_CARS, Stream { seed: 5, env: 0 });
     (0..600).for_each(|_| run.step(|_, _| ()));
     for _ in 0..n {

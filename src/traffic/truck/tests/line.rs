@@ -88,8 +88,10 @@ fn a_truck_that_waits_before_its_line_hinders_nobody_but_those_behind_it() {
 /// Whether a car's way ahead comes so near to the truck that it is in its corridor.
 fn touches_swung(network: &Network, view: &View, car: &Car) -> bool {
     (0..20).any(|k| {
-        let ahead = Car { station: car.station + (k << 21), ..*car }.outline(network);
-        let grown = Outline { half_width: ahead.half_width + 0.7, ..ahead };
-        view.now.iter().any(|unit| unit.overlaps(&grown))
+        let mut ahead = Car { station: car.station + (k << 21), ..*car }.outlines(network);
+        ahead.any(|unit| {
+            let grown = Outline { half_width: unit.half_width + 0.7, ..unit };
+            view.now.iter().any(|unit| unit.overlaps(&grown))
+        })
     })
 }
