@@ -19,16 +19,16 @@ const SAME: f64 = 0.3;
 pub(super) struct Points {
     points: Vec<DVec2>,
     headings: Vec<f64>,
+    along: Vec<DVec2>,
 }
 
 impl Points {
     pub(super) fn of(line: &Curve) -> Points {
         let n = (line.length() / FINE) as usize + 1;
         let stations = || (0..n).map(|index| index as f64 * FINE);
-        Points {
-            points: stations().map(|s| line.point_at(s)).collect(),
-            headings: stations().map(|s| line.heading_at(s)).collect(),
-        }
+        let headings: Vec<f64> = stations().map(|s| line.heading_at(s)).collect();
+        let along = headings.iter().copied().map(DVec2::from_angle).collect();
+        Points { points: stations().map(|s| line.point_at(s)).collect(), headings, along }
     }
 
     pub(super) fn len(&self) -> usize {
@@ -42,7 +42,7 @@ impl Points {
 
     /// Unit vector along the line there.
     pub(super) fn along(&self, index: usize) -> DVec2 {
-        DVec2::from_angle(self.headings[index])
+        self.along[index]
     }
 
     /// Angle between the directions of two lines, each at one of its points (rad).

@@ -62,15 +62,14 @@ impl Network {
     ///
     /// [`Error::TooLarge`], of a road with more zones than the tables hold.
     pub fn with_large(mut self, road: &Road) -> Result<Network, Error> {
-        let lines: Vec<_> = courses(road.ground()).into_iter().map(|course| course.line).collect();
+        let fine: Vec<Points> = courses(road.ground()).iter().map(|course| Points::of(&course.line)).collect();
         let driven: Vec<[Driven; N_LARGE]> =
-            lines.iter().map(|line| Large::ALL.map(|kind| Driven::new(line, kind))).collect();
-        let fine: Vec<Points> = lines.iter().map(Points::of).collect();
+            fine.iter().map(|centre| Large::ALL.map(|kind| Driven::new(centre, kind))).collect();
         let bands: [Bands; N_CLASSES] = std::array::from_fn(|class| {
             let of_path = |(points, of): (&Points, &[Driven; N_LARGE])| bands(points, of, class);
             fine.iter().zip(&driven).map(of_path).collect()
         });
-        let n = lines.len();
+        let n = fine.len();
         let mut met: Vec<Vec<Vec<Meeting>>> = Vec::new();
         for classes in 0..N_CLASSES * N_CLASSES {
             let [one, other] = [classes / N_CLASSES, classes % N_CLASSES];

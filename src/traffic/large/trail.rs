@@ -3,8 +3,7 @@
 use glam::DVec2;
 
 use super::{Large, Shape, TRACTOR};
-use crate::geometry::Curve;
-use crate::traffic::meetings::FINE;
+use crate::traffic::meetings::{FINE, Points};
 
 /// Rounds in which the line of the front is moved until what is swept lies evenly on both sides of the lane's middle,
 /// and the part of the difference that each takes away.
@@ -29,55 +28,41 @@ pub(super) struct Driven {
     pub bands: [Vec<f64>; 2],
 }
 
-/// A centre line at points every [`FINE`].
-struct Centre {
-    points: Vec<DVec2>,
-    along: Vec<DVec2>,
-}
-
-impl Centre {
-    fn of(line: &Curve) -> Centre {
-        let n = (line.length() / FINE) as usize + 1;
-        let stations = || (0..n).map(|index| index as f64 * FINE);
-        Centre {
-            points: stations().map(|s| line.point_at(s)).collect(),
-            along: stations().map(|s| DVec2::from_angle(line.heading_at(s))).collect(),
-        }
-    }
-
+impl Points {
     /// A point beside the line, between its points and before the first of them (m).
     fn beside(&self, offsets: &[f64], station: f64) -> DVec2 {
-        let last = self.points.len() - 1;
+        let last = self.len() - 1;
         let at = (station / FINE).clamp(0.0, last as f64);
         let (k, t) = ((at as usize).min(last - 1), at - (at as usize).min(last - 1) as f64);
-        let of = |k: usize| self.points[k] + offsets[k] * self.along[k].perp();
-        of(k).lerp(of(k + 1), t) + (station - at * FINE) * self.along[if station < 0.0 { 0 } else { last }]
+        let of = |k: usize| self.point(k) + offsets[k] * self.along(k).perp();
+        of(k).lerp(of(k + 1), t) + (station - at * FINE) * self.along(if station < 0.0 { 0 } else { last })
     }
 
     /// The point of the line nearest to another one, searched from a first guess on; and how far that is to its left
     /// (m).
     fn nearest(&self, point: DVec2, guess: usize) -> (usize, f64) {
-        let mut k = guess.min(self.points.len() - 1);
-        let ahead = |k: usize| (point - self.points[k]).dot(self.along[k]);
+        let mut k = guess.min(self.len() - 1);
+        let ahead = |k: usize| (point - self.point(k)).dot(self.along(k));
         while 0 < k && ahead(k) < -0.5 * FINE {
             k -= 1;
         }
-        while k + 1 < self.points.len() && 0.5 * FINE < ahead(k) {
+        while k + 1 < self.len() && 0.5 * FINE < ahead(k) {
             k += 1;
         }
-        (k, self.along[k].perp_dot(point - self.points[k]))
+        (k, self.along(k).perp_dot(point - self.point(k)))
     }
 }
 
 impl Driven {
-    pub(super) fn new(line: &Curve, kind: Large) -> Driven {
-        let (centre, shape) = (Centre::of(line), kind.shape());
-        let n = centre.points.len();
+    /// Of a centre line.
+    pub(super) fn new(centre: &Points, kind: Large) -> Driven {
+        let shape = kind.shape();
+        let n = centre.len();
         let mut driven = Driven { offsets: vec![0.0; n], directions: Vec::new(), bands: [Vec::new(), Vec::new()] };
         for round in 0..=ROUNDS {
-            driven.directions = trailed(&centre, &driven.offsets, &shape);
+            driven.directions = trailed(centre, &driven.offsets, &shape);
             driven.bands = [vec![0.0; n], vec![0.0; n]];
-            driven.sweep(&centre, &shape);
+            driven.sweep(centre, &shape);
             if round < ROUNDS {
                 let [left, right] = &driven.bands;
                 let aside = left.iter().zip(right).map(|(left, right)| 0.5 * (left - right));
@@ -90,30 +75,30 @@ impl Driven {
     }
 
     /// Notes what every unit covers from every station.
-    fn sweep(&mut self, centre: &Centre, shape: &Shape) {
+    fn sweep(&mut self, centre: &Points, shape: &Shape) {
         let (half_width, rear) = (f64::from(shape.half_width), f64::from(shape.ahead - shape.body()));
-        for k in 0..centre.points.len() {
-            let hinge = centre.points[k] + self.offsets[k] * centre.along[k].perp();
+        for k in 0..centre.len() {
+            let hinge = centre.point(k) + self.offsets[k] * centre.along(k).perp();
             self.cover(centre, k, hinge, self.directions[k], [rear, shape.ahead.into()], half_width);
             if shape.has_tractor {
                 let front = k as f64 * FINE + f64::from(shape.hinge);
                 let [steered, driven, length] = TRACTOR.map(f64::from);
                 let axles = [steered, driven].map(|behind| centre.beside(&self.offsets, front - behind));
-                let along = (axles[0] - axles[1]).normalize_or(centre.along[k]);
+                let along = (axles[0] - axles[1]).normalize_or(centre.along(k));
                 self.cover(centre, k, axles[0], along, [steered - length, steered], half_width);
             }
         }
     }
 
     /// Notes a unit: a point of it and the direction along it, from where to where it reaches, and half its width.
-    fn cover(&mut self, centre: &Centre, guess: usize, point: DVec2, along: DVec2, ends: [f64; 2], half: f64) {
+    fn cover(&mut self, centre: &Points, guess: usize, point: DVec2, along: DVec2, ends: [f64; 2], half: f64) {
         let n = ((ends[1] - ends[0]) / SIDE).ceil() as usize;
         for index in 0..=n {
             let ahead = ends[0] + (ends[1] - ends[0]) * index as f64 / n as f64;
             let guess = (guess as f64 + ahead / FINE).max(0.0) as usize;
             for side in [half, -half] {
                 let (k, left) = centre.nearest(point + ahead * along + side * along.perp(), guess);
-                for k in k.saturating_sub(1)..(k + 2).min(centre.points.len()) {
+                for k in k.saturating_sub(1)..(k + 2).min(centre.len()) {
                     self.bands[0][k] = self.bands[0][k].max(left);
                     self.bands[1][k] = self.bands[1][k].max(-left);
                 }
@@ -123,11 +108,11 @@ impl Driven {
 }
 
 /// Directions of the last unit: it points to the point that it follows, and its rear axle does not slide.
-fn trailed(centre: &Centre, offsets: &[f64], shape: &Shape) -> Vec<DVec2> {
+fn trailed(centre: &Points, offsets: &[f64], shape: &Shape) -> Vec<DVec2> {
     let wheelbase = f64::from(shape.wheelbase);
-    let mut rear = centre.beside(offsets, 0.0) - wheelbase * centre.along[0];
-    let mut directions = vec![centre.along[0]];
-    for k in 1..centre.points.len() {
+    let mut rear = centre.beside(offsets, 0.0) - wheelbase * centre.along(0);
+    let mut directions = vec![centre.along(0)];
+    for k in 1..centre.len() {
         let mut along = directions[k - 1];
         for step in 1..=SUBSTEPS {
             let lead = centre.beside(offsets, (k as f64 - 1.0 + step as f64 / SUBSTEPS as f64) * FINE);
