@@ -69,12 +69,16 @@ pub fn arrive(
     tell: &mut impl FnMut(Event, &[Car]),
 ) {
     let Setting { network, demand, .. } = setting;
+    let may_block = network.large.is_some();
     for slot in 0..cars.len() {
         let car = cars[slot];
-        if car.is_there() && network.paths[car.path()].length <= car.front() {
+        if !car.is_there() {
+            continue;
+        }
+        if network.paths[car.path()].length <= car.front() {
             tell(Event::Left(slot), cars);
             cars[slot] = Car::NONE;
-        } else if is_stuck(network, &car) {
+        } else if may_block && is_stuck(network, &car) {
             tell(Event::Removed(slot), cars);
             cars[slot] = Car::NONE;
         }
@@ -107,19 +111,17 @@ fn entering(setting: Setting, clock: Clock, cars: &[Car], source: usize, others:
     let paths = network.paths_of(source);
     let last = paths.end - 1;
     let path = paths.clone().find(|&path| falls_below(drawn, demand.shares[path])).unwrap_or(last);
-    let of_source = cars.iter().filter(|other| other.is_there() && paths.contains(&other.path()));
+    let is_of_source = |other: &Car| other.is_there() && paths.contains(&other.path());
+    let of_source = || cars.iter().enumerate().filter(|(_, other)| is_of_source(other));
     let car = Car::entering(path, style([kind, driver], demand), 0);
-    let before = || {
-        let of_source = cars.iter().enumerate().filter(|(_, other)| other.is_there() && paths.contains(&other.path()));
-        of_source.min_by_key(|(_, other)| other.rear())
-    };
+    let before = || of_source().min_by_key(|(_, other)| other.rear());
     let car = match network.large.as_ref().and_then(|_| before()) {
         Some((slot, other)) => car.replaced_by(large(clock.next_large(source, slot as u32, other.style()), demand)),
         None => car.replaced_by(large(kind, demand)),
     };
     let car = if network.fits(&car) { car } else { car.replaced_by(0) };
     let beside = cars.iter().filter_map(|other| beside(network, &car, other));
-    let ahead = of_source.map(|other| (other.rear(), other.pace())).chain(beside).chain(others.ahead(&car));
+    let ahead = of_source().map(|(_, other)| (other.rear(), other.pace())).chain(beside).chain(others.ahead(&car));
     let (rear, pace) = ahead.fold((BEYOND, 0), |nearest, other| if other.0 < nearest.0 { other } else { nearest });
     let room = rear - car.front();
     if room < ENTRY_ROOM {
@@ -129,9 +131,9 @@ fn entering(setting: Setting, clock: Clock, cars: &[Car], source: usize, others:
     Some(Car { speed: pace << FINER_SPEED, ..car })
 }
 
-/// Whether a car stands in a ring that is blocked.
+/// Whether a car stands where large vehicles have blocked a ring.
 fn is_stuck(network: &Network, car: &Car) -> bool {
-    network.large.is_some() && car.is_there() && STUCK <= car.standing() && network.line_of(car)[0] < car.front()
+    STUCK <= car.standing() && network.line_of(car)[0] < car.front()
 }
 
 /// Rear and speed of a car on another lane that is in the way of one that enters, where one of them is large.

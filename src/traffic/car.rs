@@ -164,6 +164,11 @@ impl Car {
         kind(self.style())
     }
 
+    /// Whether it is one.
+    pub(super) fn is_large(&self) -> bool {
+        self.style() >> LARGE != 0
+    }
+
     /// Its class by the room that it needs; 0 of a car or a van.
     pub(super) fn class(&self) -> usize {
         self.large().map_or(0, Large::class)

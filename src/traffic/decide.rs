@@ -103,6 +103,7 @@ impl<'a> Crowd<'a> {
     }
 
     /// The car in a slot, as it is weighed.
+    #[inline]
     fn seen(&self, slot: usize) -> Seen {
         let car = &self.cars[slot];
         let [line, _] = self.network.line_of(car);
@@ -344,7 +345,7 @@ impl<'a> Driver<'a> {
         let car = self.car();
         // Half a step ahead: a speed's unit is the way of half a step.
         let limit = self.network().limit(self.path, car.station + car.speed);
-        let is_large = car.large().is_some();
+        let is_large = car.is_large();
         let limit = if is_large { (limit * PACE_OF_LARGE) >> 4 } else { limit };
         let wished = limit.max(LEAST_WISHED) * (SPEED_PARTS + self.temperament) / SPEED_PARTS;
         let most = if is_large { MOST_OF_LARGE } else { i32::MAX };

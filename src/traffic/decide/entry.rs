@@ -91,7 +91,7 @@ impl Driver<'_> {
         let lane = self.crowd.network.source_of(self.path).lane.min(1) as usize;
         let lag = if kind == Kind::Soft { rules.soft_lags[lane] } else { rules.lags[usize::from(crosses)] };
         let patience = (IMPATIENCE - self.me.standing as i32).max(LEAST_PATIENCE);
-        let lag = lag + if self.car().large().is_some() { LAG_OF_LARGE } else { 0 };
+        let lag = lag + if self.car().is_large() { LAG_OF_LARGE } else { 0 };
         lag * (TIME_PARTS - self.temperament) * patience / (TIME_PARTS * IMPATIENCE)
     }
 

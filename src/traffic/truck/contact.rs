@@ -87,7 +87,7 @@ pub fn touched(network: &Network, own: &Met, cars: &[Car]) -> Option<Contact> {
     let middle = 0.5 * (tractor.middle + trailer.middle);
     let reach = 0.5 * tractor.middle.distance(trailer.middle) + tractor.half_length.max(trailer.half_length) + NEAR_CAR;
     let is_near = |car: &Car| {
-        let reach = reach + if car.large().is_some() { LONGER_THAN_CAR } else { 0.0 };
+        let reach = reach + if car.is_large() { LONGER_THAN_CAR } else { 0.0 };
         front(network, car).distance_squared(middle) < reach * reach
     };
     let near = cars.iter().enumerate().filter(|(_, car)| car.is_there() && is_near(car));

@@ -140,7 +140,7 @@ fn slow(view: &View, driver: &mut Driver, rear: i32) {
 
 /// Whether a car is about to touch a truck, with its front near a point.
 fn touches_soon(view: &View, network: &Network, car: &Car, front: Vec2) -> bool {
-    let near = NEAR_UNIT + if car.large().is_some() { LONGER_THAN_CAR } else { 0.0 };
+    let near = NEAR_UNIT + if car.is_large() { LONGER_THAN_CAR } else { 0.0 };
     if !view.now.iter().any(|unit| unit.distance_squared(front) < near * near) {
         return false;
     }
