@@ -67,6 +67,7 @@ pub const FILES: &[(&str, &str)] = embedded![
     "traffic2026-distracted.toml",
     "traffic2026-rude.toml",
     "traffic2026-laden.toml",
+    "traffic2026-large.toml",
     "traffic2026-maps.toml",
     "transfer2026.toml",
     "transfer2026-30kmh.toml",

@@ -34,8 +34,8 @@ fn every_scenario_file_of_the_repository_is_embedded_as_it_is() {
         FILES.iter().map(|&(path, text)| (path.to_owned(), text.to_owned())).collect();
     assert_eq!(
         (files.len(), FILES.len()),
-        (70, 70),
-        "43 benchmarks, ten roundabouts, five outlines, ten vehicles, two distributions"
+        (71, 71),
+        "44 benchmarks, ten roundabouts, five outlines, ten vehicles, two distributions"
     );
     assert!(files == embedded, "on disk {:?}, embedded {:?}", files.keys(), embedded.keys());
     let kinds = [Kind::Benchmark, Kind::Roundabout, Kind::Vehicle, Kind::Distribution];
@@ -139,6 +139,12 @@ fn the_held_out_benchmarks_of_traffic2026_differ_from_it_in_what_they_are_named_
     let mut expected = traffic["traffic"].clone();
     expected.as_table_mut().unwrap().insert("rude".to_owned(), 0.3.into());
     assert_eq!(among(rude), expected);
+    let large = "traffic2026-large";
+    assert_eq!(without(table(large), &["traffic"]), without(traffic.clone(), &["traffic"]));
+    let mut expected = traffic["traffic"].as_table().unwrap().clone();
+    expected.insert("vans".to_owned(), 0.2.into());
+    expected.extend(["buses", "rigid_trucks", "tractor_trailers"].map(|kind| (kind.to_owned(), 0.05.into())));
+    assert_eq!(among(large), toml::Value::Table(expected));
     for key in ["vehicle", "draw", "ending", "start"] {
         assert_eq!(table("traffic2026-laden")[key], table("laden2026")[key], "{key}");
     }
@@ -256,7 +262,7 @@ fn the_continuous_benchmarks_differ_from_those_with_levels_in_their_actions_alon
 fn every_name_gives_what_its_file_gives() {
     // The two with thousands of roads take minutes; the next test reads them as text.
     let benchmarks: Vec<&str> = Kind::Benchmark.names().filter(|name| !LARGE.contains(name)).collect();
-    assert_eq!(benchmarks.len(), 41);
+    assert_eq!(benchmarks.len(), 42);
     for name in benchmarks {
         let named = Scenario::named(name).unwrap();
         let read = Scenario::read(&scenarios().join(name).with_extension("toml")).unwrap();
