@@ -41,6 +41,8 @@ pub struct Counts {
     pub stayed: u64,
     /// Cars that passed the line.
     pub served: u64,
+    /// Those of them that stood in a blocked ring for two minutes, and were taken away.
+    pub removed: u64,
     /// Ring cars that passed the arm's entry.
     pub circulating: u64,
     /// Sum of the control delays of cars that came up to speed behind the line (s).
@@ -57,6 +59,7 @@ impl Counts {
         self.came += other.came;
         self.stayed += other.stayed;
         self.served += other.served;
+        self.removed += other.removed;
         self.circulating += other.circulating;
         self.delay += other.delay;
         self.delayed += other.delayed;
@@ -214,7 +217,12 @@ impl<'a> Observer<'a> {
                     let free = *self.free.entry(car.what).or_insert_with(|| self.survey.free_time(unhindered));
                     self.known[slot] = self.outside[source].pop_front().map(|came| Known { came, free });
                 }
-                Event::Left(slot) | Event::Removed(slot) => changed[slot] = true,
+                Event::Left(slot) => changed[slot] = true,
+                Event::Removed(slot) => {
+                    changed[slot] = true;
+                    let source = self.survey.network.paths[before[slot].path()].source as usize;
+                    self.counts[source].removed += u64::from(counts);
+                }
             }
         }
         if !counts {

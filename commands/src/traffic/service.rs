@@ -30,6 +30,8 @@ struct Found {
     served: f64,
     /// Part of those who came that found 15 waiting, and stayed away.
     stayed: f64,
+    /// How many stood in a blocked ring for two minutes, and were taken away.
+    removed: u64,
 }
 
 /// What was found of an entry lane; flows in cars an hour, delays in seconds, queues in cars.
@@ -114,6 +116,7 @@ fn found(args: &Args, place: &Place, mix: Mix, bar: &Bar) -> Result<Found, Error
         demand: total,
         served: all.served as f64 / hours,
         stayed: all.stayed as f64 / all.came.max(1) as f64,
+        removed: all.removed,
     })
 }
 
@@ -160,7 +163,12 @@ impl Found {
         } else {
             String::new()
         };
+        let removed = match self.removed {
+            0 => String::new(),
+            1 => "1 vehicle stood in a blocked ring for two minutes and was taken away.\n".to_owned(),
+            n => format!("{n} vehicles stood in a blocked ring for two minutes and were taken away.\n"),
+        };
         let length = if self.runs == 1 { "1 run".to_owned() } else { format!("{} runs", self.runs) };
-        format!("{}: cars an hour over {length} of {} min\n{}{away}", self.road, self.minutes, table(&rows))
+        format!("{}: cars an hour over {length} of {} min\n{}{away}{removed}", self.road, self.minutes, table(&rows))
     }
 }
