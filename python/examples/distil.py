@@ -11,6 +11,12 @@ learning and structured prediction to no-regret online learning", AISTATS 2011) 
 So it sees the states that it gets into itself, and every step says which action is right, so that it takes in many more
 roads than a learner by trial and error.
 
+    python distil.py runs/traffic-*/policy.safetensors --together --scenario distil_traffic.toml \\
+        --validation traffic2026-random
+
+With ``--together`` it imitates the mean of all teachers' probabilities on every route. Where they are seeds of one
+training they err at different places, and their mean less than any of them.
+
 Writes ``distilled.safetensors``, which ``offtrack evaluate --policy`` drives, and ``distilled.json`` with the curve and
 the success on the validation routes. Ctrl-C ends the training early; what was learned is kept.
 """
@@ -104,20 +110,14 @@ def survey(policy: Policy, batch: Batch, routes: list[str], starts: np.ndarray, 
     return found.reshape(-1, n_episodes, 3)
 
 
-def choose(args: Any) -> tuple[list[str], np.ndarray, list[dict[str, Any]]]:
+def choose(policies: list[Policy], args: Any) -> tuple[list[str], np.ndarray, list[dict[str, Any]]]:
     """Lets the teachers drive. Returns the names of the routes, the index of each one's teacher, and what each teacher
     did; of a later one only on the routes on which no earlier one was without fault."""
     # In this mode a truck's columns are those after its last step until the next one.
     batch = Batch(args.scenario, args.envs, split="train", seed=args.seed, autoreset="next_step")
-    policies = [Policy.load(file) for file in args.teachers]
-    for policy in policies:
-        try:
-            policy.check(batch)
-        except ValueError as error:
-            raise SystemExit(str(error)) from None
     names = batch.split_routes
     starts = np.random.default_rng(args.seed).uniform(-args.starts, args.starts, (len(names), args.episodes, 2))
-    scores = np.full((len(args.teachers), len(names)), -1)
+    scores = np.full((len(policies), len(names)), -1)
     left, surveys = np.arange(len(names)), []
     for teacher, policy in enumerate(policies):
         found = survey(policy, batch, [names[route] for route in left], starts[left], args.margin)
@@ -143,7 +143,18 @@ def choose(args: Any) -> tuple[list[str], np.ndarray, list[dict[str, Any]]]:
     return names, chosen, surveys
 
 
-def distil(teachers: list[Network], student: Network, of_route: np.ndarray, batch: Batch, args: Any) -> list[Any]:
+class Mean(nn.Module):
+    """Logits of the mean of several policies' probabilities."""
+
+    def __init__(self, policies: list[Network]) -> None:
+        super().__init__()
+        self.policies = nn.ModuleList(policies)
+
+    def forward(self, observation: torch.Tensor) -> torch.Tensor:
+        return torch.stack([policy(observation).softmax(-1) for policy in self.policies]).mean(0).log()
+
+
+def distil(teachers: list[nn.Module], student: Network, of_route: np.ndarray, batch: Batch, args: Any) -> list[Any]:
     """Lets the student imitate ``teachers[of_route[r]]`` on route r of ``batch.route_names``; returns the curve."""
     rng = np.random.default_rng(args.seed)
     rare = [batch.route_names[route] for route in np.flatnonzero(of_route > 0)]
@@ -218,6 +229,7 @@ def main() -> None:
     parser.add_argument(
         "--scenario", type=Path, default=HERE / "distil_roads.toml", help="benchmark on whose training routes"
     )
+    parser.add_argument("--together", action="store_true", help="imitate the mean of all teachers on every route")
     parser.add_argument("--validation", default="random2026", help="benchmark on whose validation routes it is judged")
     parser.add_argument("--episodes", type=int, default=2, help="episodes of each teacher on a route, to choose by")
     parser.add_argument(
@@ -247,20 +259,28 @@ def main() -> None:
     if not 0 <= args.starts <= 1:
         parser.error("--starts: must lie in 0..1")
     args.out.parent.mkdir(parents=True, exist_ok=True)
+    policies = [Policy.load(file) for file in args.teachers]
     # The student begins as the first teacher.
-    *teachers, student = (Network(Policy.load(file)) for file in [*args.teachers, args.teachers[0]])
+    teachers, student = [Network(policy) for policy in policies], Network(policies[0])
     batch = Batch(args.scenario, args.envs, split="train", seed=args.seed)
-    names, chosen, surveys = choose(args)
-    by_name = dict(zip(names, chosen.tolist()))
-    of_route = np.array([by_name.get(name, 0) for name in batch.route_names])
-    curve = distil(teachers, student, of_route, batch, args)
+    for policy in policies:
+        try:
+            policy.check(batch)
+        except ValueError as error:
+            raise SystemExit(str(error)) from None
+    of_route, surveys = np.zeros(len(batch.route_names), dtype=np.int64), []
+    if not args.together:
+        names, chosen, surveys = choose(policies, args)
+        by_name = dict(zip(names, chosen.tolist()))
+        of_route = np.array([by_name.get(name, 0) for name in batch.route_names])
+    curve = distil([Mean(teachers)] if args.together else teachers, student, of_route, batch, args)
     file = Path(f"{args.out}.safetensors")
     student.save(file, args.scenario)
     found = offtrack_sim.evaluate(Policy.load(file), args.validation, split="validation", episodes=4)
     result = {
         "example": "distil",
         **about("numpy", "torch"),
-        "settings": {**vars(args), "teachers": [file.name for file in args.teachers], "scenario": args.scenario.name}
+        "settings": {**vars(args), "teachers": [str(file) for file in args.teachers], "scenario": args.scenario.name}
         | {"out": str(args.out)},
         "seconds": round(time.perf_counter() - start, 1),
         "survey": surveys,
