@@ -98,8 +98,13 @@ fn the_shipped_policies_are_written_as_they_were_read_byte_for_byte() {
     for name in Policy::shipped_names() {
         let policy = Policy::shipped(name).unwrap();
         assert_eq!(policy.name, format!("{name} (shipped)"));
-        // The one near its lane's centre learned on roads of an example of the Python package.
-        assert_eq!(policy.benchmark, if name == "attard2023-lane" { "distil_roads" } else { name });
+        // Two learned by imitation, on roads of an example of the Python package.
+        let learned_on = match name {
+            "attard2023-lane" => "distil_roads",
+            "traffic2026" => "distil_traffic",
+            _ => name,
+        };
+        assert_eq!(policy.benchmark, learned_on);
         assert_eq!(policy.activation, Activation::Relu);
         assert!(policy.to_bytes() == std::fs::read(folder.join(name).join("policy.safetensors")).unwrap(), "{name}");
     }
