@@ -5,8 +5,8 @@ Standard library only.
 
     python3 benches/among.py --json docs/results/traffic.json
 
-With --benchmarks those alone are driven, and what the file has of the others stays. With --policies others are driven
-than those that come with the program, into a file of their own:
+With --benchmarks or --policies those alone are driven, and what the file has of the others stays: rows have the commit
+that they were driven at. Policies of one's own go into a file of their own:
 
     python3 benches/among.py --policies yields:runs/traffic-1/policy.safetensors \\
         --benchmarks traffic2026 traffic2026-random --json docs/results/traffic-seeds.json
@@ -32,6 +32,7 @@ BENCHMARKS = {
     "traffic2026-timid": 30,
     "traffic2026-distracted": 30,
     "traffic2026-laden": 120,
+    "traffic2026-large": 120,
     "traffic2026-maps": 30,
 }
 # Where the starts of what did not arrive are searched on the empty road, and of which policies.
@@ -71,13 +72,10 @@ def row(name, benchmark, report):
     levels = ", ".join(f"{demand} {100 * figures['success']:.1f} %" for demand, figures in by_demand.items())
     print(f"{name}, {benchmark}: {report['arrived']} of {report['episodes']}; {levels}", flush=True)
     causes = {cause["cause"]: cause["episodes"] for cause in report["failures"][:8]}
-    found = {**kept(report, FIGURES), "by_demand": by_demand, "causes": causes}
+    found = {"commit": report["commit"], **kept(report, FIGURES), "by_demand": by_demand, "causes": causes}
     if "possible" in report:
         of_demands = {group["name"]: kept(group, BY_DEMAND) for group in report["possible"]["demand"]}
-        found["possible"] = kept(report["possible"], [*POSSIBLE, *BY_DEMAND]) | {
-            "by_demand": of_demands,
-            "commit": report["commit"],
-        }
+        found["possible"] = kept(report["possible"], [*POSSIBLE, *BY_DEMAND]) | {"by_demand": of_demands}
     return found
 
 
@@ -88,31 +86,30 @@ def main():
     parser.add_argument("--benchmarks", nargs="+", choices=BENCHMARKS, help="these alone")
     parser.add_argument("--policies", nargs="+", help="these in place of those that come with the program")
     args = parser.parse_args()
+    names = args.policies or POLICIES
+    shipped = set(names) <= set(POLICIES)
     result = {
         "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
         "command": "python3 benches/among.py --json docs/results/traffic.json",
         "episodes_a_route": BENCHMARKS,
-        "training": "offtrack train traffic, seed 0; the budget was raised from 12 to 18 million env steps on the way; "
-        "the policy is the best of 20 validations on 40 validation roads, after 17.1 million",
     }
-    if args.policies:
+    if not shipped:
         benchmarks = ["--benchmarks", *args.benchmarks] if args.benchmarks else []
-        words = ["--policies", *args.policies, *benchmarks, "--json", f"docs/results/{args.json.name}"]
-        result = {"date": result["date"], "command": shlex.join(["python3", "benches/among.py", *words])}
-    elif args.benchmarks:
-        result = json.loads(args.json.read_text())
-    policies = {name: result.get(name, {}) for name in args.policies or POLICIES}
+        words = ["--policies", *names, *benchmarks, "--json", f"docs/results/{args.json.name}"]
+        result["command"] = shlex.join(["python3", "benches/among.py", *words])
+    elif args.policies or args.benchmarks:
+        result = json.loads(args.json.read_text()) | result
+    policies = {name: result.get(name, {}) for name in names}
     for benchmark in args.benchmarks or BENCHMARKS:
         for name, rows in policies.items():
             report = driven(args.offtrack, name, benchmark, BENCHMARKS[benchmark])
             rows[benchmark] = row(name, benchmark, report)
-            if args.policies or not args.benchmarks:
-                result |= {"commit": report["commit"], "machine": report["machine"]}
+            result |= {"commit": report["commit"], "machine": report["machine"]}
             write_json(args.json, {**result, **policies})
-    if args.benchmarks or args.policies:
+    if args.benchmarks or not shipped:
         return
-    benchmark, names, episodes = POLITE
-    for name in names:
+    benchmark, polite, episodes = POLITE
+    for name in [name for name in polite if name in policies]:
         policies[name]["polite"] = row(name, f"{episodes} episodes", driven(args.offtrack, name, benchmark, episodes))
     base, demand, none, episodes = EMPTY
     scenarios = ROOT / "scenarios"
