@@ -39,8 +39,18 @@ fn every_entry_lane_has_its_flows_its_delay_and_the_manuals() {
         assert!((0.0..60.0).contains(&delay) && (800.0..1420.0).contains(&capacity), "{entry}");
         assert!(hcm["lanes"].as_str().unwrap().starts_with("2 into 2"), "{entry}");
     }
+    assert_eq!(found[0]["removed"], 0, "without large vehicles");
     // The same again: nothing depends on threads.
     assert_eq!(found, json(&["16m", "--demand", "1200", "--minutes", "10", "--runs", "2", "--share", "vans=0.2"]));
+}
+
+#[test]
+fn who_stands_in_a_ring_that_large_vehicles_block_is_counted() {
+    let shares = ["--share", "tractor_trailers=0.3", "--share", "buses=0.1"];
+    let found = json(&[&["20m", "--demand", "2100", "--minutes", "20", "--runs", "2"], &shares[..]].concat());
+    let (removed, served) = (found[0]["removed"].as_u64().unwrap(), found[0]["served"].as_f64().unwrap());
+    // Two runs of 20 min.
+    assert!(0 < removed && (removed as f64) < 0.1 * served * 2.0 / 3.0, "{removed} of {served} an hour");
 }
 
 #[test]
