@@ -84,7 +84,7 @@ def main():
     parser.add_argument("--offtrack", default=str(ROOT / "target/release/offtrack"), help="the program")
     parser.add_argument("--json", type=Path, required=True, help="file to write")
     parser.add_argument("--benchmarks", nargs="+", choices=BENCHMARKS, help="these alone")
-    parser.add_argument("--policies", nargs="+", help="these in place of those that come with the program")
+    parser.add_argument("--policies", nargs="+", help="these of the program's, or files in place of them")
     args = parser.parse_args()
     names = args.policies or POLICIES
     shipped = set(names) <= set(POLICIES)

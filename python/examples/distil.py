@@ -14,8 +14,8 @@ roads than a learner by trial and error.
     python distil.py runs/traffic-*/policy.safetensors --together --scenario distil_traffic.toml \\
         --validation traffic2026-random
 
-With ``--together`` it imitates the mean of all teachers' probabilities on every route. Where they are seeds of one
-training they err at different places, and their mean less than any of them.
+With ``--together`` it imitates the mean of all teachers' probabilities on every route and chooses no teacher. Where
+they are seeds of one training they err at different places, and their mean less than any of them.
 
 Writes ``distilled.safetensors``, which ``offtrack evaluate --policy`` drives, and ``distilled.json`` with the curve and
 the success on the validation routes. Ctrl-C ends the training early; what was learned is kept.
@@ -229,7 +229,11 @@ def main() -> None:
     parser.add_argument(
         "--scenario", type=Path, default=HERE / "distil_roads.toml", help="benchmark on whose training routes"
     )
-    parser.add_argument("--together", action="store_true", help="imitate the mean of all teachers on every route")
+    parser.add_argument(
+        "--together",
+        action="store_true",
+        help="imitate the mean of all teachers on every route: no --episodes, --starts, --margin, --rare",
+    )
     parser.add_argument("--validation", default="random2026", help="benchmark on whose validation routes it is judged")
     parser.add_argument("--episodes", type=int, default=2, help="episodes of each teacher on a route, to choose by")
     parser.add_argument(
