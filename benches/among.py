@@ -98,6 +98,8 @@ def main():
         words = ["--policies", *names, *benchmarks, "--json", f"docs/results/{args.json.name}"]
         result["command"] = shlex.join(["python3", "benches/among.py", *words])
     elif args.policies or args.benchmarks:
+        if not args.json.is_file():
+            parser.error(f"--json: {args.json}; is not there to keep rows of: leave out --policies and --benchmarks")
         result = json.loads(args.json.read_text()) | result
     policies = {name: result.get(name, {}) for name in names}
     for benchmark in args.benchmarks or BENCHMARKS:

@@ -263,15 +263,18 @@ def main() -> None:
     if not 0 <= args.starts <= 1:
         parser.error("--starts: must lie in 0..1")
     args.out.parent.mkdir(parents=True, exist_ok=True)
-    policies = [Policy.load(file) for file in args.teachers]
+    try:
+        policies = [Policy.load(file) for file in args.teachers]
+        batch = Batch(args.scenario, args.envs, split="train", seed=args.seed)
+        # What the student is judged on in the end.
+        judged = Batch(args.validation, 1, split="validation")
+        for policy in policies:
+            policy.check(batch)
+            policy.check(judged)
+    except ValueError as error:
+        raise SystemExit(str(error)) from None
     # The student begins as the first teacher.
     teachers, student = [Network(policy) for policy in policies], Network(policies[0])
-    batch = Batch(args.scenario, args.envs, split="train", seed=args.seed)
-    for policy in policies:
-        try:
-            policy.check(batch)
-        except ValueError as error:
-            raise SystemExit(str(error)) from None
     of_route, surveys = np.zeros(len(batch.route_names), dtype=np.int64), []
     if not args.together:
         names, chosen, surveys = choose(policies, args)
