@@ -34,12 +34,12 @@ fn every_scenario_file_of_the_repository_is_embedded_as_it_is() {
         FILES.iter().map(|&(path, text)| (path.to_owned(), text.to_owned())).collect();
     assert_eq!(
         (files.len(), FILES.len()),
-        (71, 71),
-        "44 benchmarks, ten roundabouts, five outlines, ten vehicles, two distributions"
+        (72, 72),
+        "45 benchmarks, ten roundabouts, five outlines, ten vehicles, two distributions"
     );
     assert!(files == embedded, "on disk {:?}, embedded {:?}", files.keys(), embedded.keys());
     let kinds = [Kind::Benchmark, Kind::Roundabout, Kind::Vehicle, Kind::Distribution];
-    assert_eq!(kinds.map(|kind| kind.names().count()), [44, 10, 10, 2]);
+    assert_eq!(kinds.map(|kind| kind.names().count()), [45, 10, 10, 2]);
 }
 
 /// A shipped benchmark's file as it is read as TOML.
@@ -201,6 +201,22 @@ fn the_benchmarks_of_transfer2026_differ_in_roads_training_and_disturbances_alon
     assert_eq!(random.remove("procedural"), table("laden2026-random").remove("procedural"));
     expected.remove("roundabout");
     assert_eq!(random, expected);
+    // A refinement has other roads, one more vehicle, and lags and slip down to less; its seed is no other benchmark's.
+    let (mut refinement, mut training) = (table("transfer2026-refinement"), table("transfer2026-training"));
+    assert_ne!(refinement["procedural"]["seed"], training["procedural"]["seed"]);
+    let vehicles = refinement["vehicle"].as_array().unwrap();
+    assert_eq!(vehicles[..2], training["vehicle"].as_array().unwrap()[..]);
+    assert_eq!((vehicles.len(), vehicles[2].get("model")), (3, None));
+    for key in ["slip", "drive_lag", "brake_lag"] {
+        let [least, trained] = [&refinement, &training].map(|table| table["draw"][key][0].as_float().unwrap());
+        assert!(least < trained, "{key}");
+    }
+    for table in [&mut refinement, &mut training] {
+        for key in ["procedural", "vehicle", "draw"] {
+            table.remove(key);
+        }
+    }
+    assert_eq!(refinement, training);
     let (mut training, laden) = (table("transfer2026-training"), table("laden2026-training"));
     for key in ["procedural", "reward", "start", "ending", "actions", "observation"] {
         assert_eq!(training.remove(key), laden.get(key).cloned(), "{key}");
@@ -260,8 +276,9 @@ fn the_continuous_benchmarks_differ_from_those_with_levels_in_their_actions_alon
 
 #[test]
 fn every_name_gives_what_its_file_gives() {
-    // The two with thousands of roads take minutes; the next test reads them as text.
-    let benchmarks: Vec<&str> = Kind::Benchmark.names().filter(|name| !LARGE.contains(name)).collect();
+    // Those with thousands of roads take minutes; the next test reads them as text.
+    let large = [&LARGE[..], &["transfer2026-refinement"]].concat();
+    let benchmarks: Vec<&str> = Kind::Benchmark.names().filter(|name| !large.contains(name)).collect();
     assert_eq!(benchmarks.len(), 42);
     for name in benchmarks {
         let named = Scenario::named(name).unwrap();

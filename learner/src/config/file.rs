@@ -10,7 +10,7 @@ use crate::error::Error;
 use offtrack_evaluation::error::Error as Evaluation;
 
 /// The training files that come with the program.
-const SHIPPED: [(&str, &str); 12] = [
+const SHIPPED: [(&str, &str); 13] = [
     ("default", include_str!("../../configs/default.toml")),
     ("best", include_str!("../../configs/best.toml")),
     ("lane", include_str!("../../configs/lane.toml")),
@@ -20,6 +20,7 @@ const SHIPPED: [(&str, &str); 12] = [
     ("laden", include_str!("../../configs/laden.toml")),
     ("laden-50", include_str!("../../configs/laden-50.toml")),
     ("transfer", include_str!("../../configs/transfer.toml")),
+    ("transfer-refined", include_str!("../../configs/transfer-refined.toml")),
     ("traffic", include_str!("../../configs/traffic.toml")),
     ("laden-gpu", include_str!("../../configs/laden-gpu.toml")),
     ("paper", include_str!("../../configs/paper.toml")),

@@ -242,7 +242,7 @@ fn a_benchmark_of_ones_own_takes_the_place_of_all_that_a_training_file_says_of_o
 fn every_training_file_reads_by_path_and_by_name() {
     let folder = files::repository().join("learner/configs");
     let files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
-    assert_eq!(files.len(), 12);
+    assert_eq!(files.len(), 13);
     for file in files {
         let by_path = Config::read(&file).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(Config::read(Path::new(file.file_stem().unwrap())).unwrap(), by_path);
@@ -251,7 +251,7 @@ fn every_training_file_reads_by_path_and_by_name() {
     assert!(
         message.contains(
             "papre: is no training file: the program comes with default, best, lane, attard, gpu, as-run, laden, \
-            laden-50, transfer, traffic, laden-gpu, paper"
+            laden-50, transfer, transfer-refined, traffic, laden-gpu, paper"
         ),
         "{message}"
     );
