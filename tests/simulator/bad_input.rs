@@ -219,7 +219,10 @@ fn no_missing_line_cut_or_unknown_key_makes_a_reader_panic() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
     #[test]
-    fn no_scrambled_bytes_make_a_reader_panic(which in any::<prop::sample::Index>(), edits in prop::collection::vec((any::<prop::sample::Index>(), 0x20u8..0x7f), 1..6)) {
+    fn no_scrambled_bytes_make_a_reader_panic(
+        which in any::<prop::sample::Index>(),
+        edits in prop::collection::vec((any::<prop::sample::Index>(), 0x20u8..0x7f), 1..6),
+    ) {
         let folder = copy();
         let files = files();
         let file = which.get(&files);

@@ -261,7 +261,11 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 100, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn changed_bytes_of_a_map_give_a_result_or_an_error(at in any::<prop::sample::Index>(), byte in 32u8..127, dropped in 0usize..30) {
+    fn changed_bytes_of_a_map_give_a_result_or_an_error(
+        at in any::<prop::sample::Index>(),
+        byte in 32u8..127,
+        dropped in 0usize..30,
+    ) {
         let mut bytes = fs::read(map("maliput_Roundabout.xodr")).unwrap();
         let at = at.index(bytes.len());
         bytes[at] = byte;

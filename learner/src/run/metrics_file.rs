@@ -11,7 +11,8 @@ use crate::error::Error;
 const LOCK_TIME: Duration = Duration::from_secs(3);
 
 /// Names of the columns.
-pub(super) const HEAD: &str = "seconds,env_steps,episodes,updates,success,reward,critic_loss,actor_loss,entropy,value,entropy_coefficient,steps_per_second,updates_per_second,validation_success\n";
+pub(super) const HEAD: &str = "seconds,env_steps,episodes,updates,success,reward,critic_loss,actor_loss,entropy,\
+    value,entropy_coefficient,steps_per_second,updates_per_second,validation_success\n";
 
 /// The file, held by one run at a time.
 #[derive(Debug)]

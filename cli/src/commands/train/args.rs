@@ -10,9 +10,8 @@ pub struct Args {
     /// it `default`, in a program built for graphics devices `gpu`.
     pub(super) config: Option<PathBuf>,
     /// A benchmark of your own, a path or a name: train on its training routes, with its own reward, and evaluate on
-    /// its
-    /// test routes. The policy is chosen on its validation routes. Where it has no training or no validation routes,
-    /// its vehicle and actions drive on those of random2026.
+    /// its test routes. The policy is chosen on its validation routes. Where it has no training or no validation
+    /// routes, its vehicle and actions drive on those of random2026.
     #[arg(long)]
     pub(super) benchmark: Option<String>,
     /// Name of the run's folder; must be new. Without it the training file's name, numbered.
@@ -54,6 +53,12 @@ pub struct Args {
     /// --minutes or --steps give another budget, counted from the run's beginning; a finished run continues too. The
     /// learning-rate schedule ends with the budget, so with a larger one the rates are higher from here on. With a
     /// budget of steps alone the result is that of a run never stopped, bit for bit on the same machine and program.
-    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["config", "benchmark", "name", "out", "seed", "seeds", "from", "envs", "adapter", "settings"])]
+    #[arg(
+        long,
+        value_name = "FOLDER",
+        conflicts_with_all = [
+            "config", "benchmark", "name", "out", "seed", "seeds", "from", "envs", "adapter", "settings",
+        ]
+    )]
     pub(super) resume: Option<PathBuf>,
 }
