@@ -215,6 +215,9 @@ pub struct Learning {
 pub struct Refinement {
     /// Fraction of the budget after which it begins.
     pub begin: f64,
+    /// Factor of the logits that it begins with. The most probable action stays, others become rarer.
+    #[serde(default = "Refinement::logits_as_they_are")]
+    pub logit_factor: f64,
     /// Steps of each truck that are learned from at a time.
     pub n_steps: usize,
     /// Passes over them.

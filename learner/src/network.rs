@@ -101,6 +101,15 @@ impl Mlp {
         self.with_parameters(self.parameters().into_iter().map(|(_, values)| values).collect(), device)
     }
 
+    /// A copy of this network on a device, of `factor` times its outputs.
+    pub fn times(&self, factor: f32, device: &Device) -> Mlp {
+        let mut parameters: Vec<Vec<f32>> = self.parameters().into_iter().map(|(_, values)| values).collect();
+        // Norms stand behind the layers, and the last layer has none.
+        let last = 2 * self.layers.len();
+        parameters[last - 2..last].iter_mut().flatten().for_each(|value| *value *= factor);
+        self.with_parameters(parameters, device)
+    }
+
     /// A network of the same sizes with other parameters, as many and as long as [`Mlp::parameters`] gives.
     pub fn with_parameters(&self, parameters: Vec<Vec<f32>>, device: &Device) -> Mlp {
         let mut parameters = parameters.into_iter();

@@ -66,13 +66,14 @@ impl Ppo {
     pub fn new(settings: &Refinement, actor: &Mlp, seed: u64) -> Result<Ppo, Error> {
         let device = Device::flex();
         let rng = &mut SmallRng::seed_from_u64(seed);
+        let actor = actor.times(settings.logit_factor as f32, &device);
         let mut sizes: Vec<usize> = actor.layers.iter().map(|layer| layer.weight.dims()[0]).collect();
         sizes.push(1);
         Ok(Ppo {
             settings: settings.clone(),
             critic: Mlp::new(&sizes, 0.1, rng, &device).with_layer_norm(),
             actor_ema: actor.on(&device),
-            actor: actor.on(&device),
+            actor,
             actor_optimizer: Adam::new(true),
             critic_optimizer: Adam::new(true),
             shuffling: Generator::seed_from_u64(rng.next_u64()),

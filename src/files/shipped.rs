@@ -62,6 +62,7 @@ pub const FILES: &[(&str, &str)] = embedded![
     "traffic2026.toml",
     "traffic2026-random.toml",
     "traffic2026-training.toml",
+    "traffic2026-refinement.toml",
     "traffic2026-aggressive.toml",
     "traffic2026-timid.toml",
     "traffic2026-distracted.toml",

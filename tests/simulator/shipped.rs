@@ -34,12 +34,12 @@ fn every_scenario_file_of_the_repository_is_embedded_as_it_is() {
         FILES.iter().map(|&(path, text)| (path.to_owned(), text.to_owned())).collect();
     assert_eq!(
         (files.len(), FILES.len()),
-        (72, 72),
-        "45 benchmarks, ten roundabouts, five outlines, ten vehicles, two distributions"
+        (73, 73),
+        "46 benchmarks, ten roundabouts, five outlines, ten vehicles, two distributions"
     );
     assert!(files == embedded, "on disk {:?}, embedded {:?}", files.keys(), embedded.keys());
     let kinds = [Kind::Benchmark, Kind::Roundabout, Kind::Vehicle, Kind::Distribution];
-    assert_eq!(kinds.map(|kind| kind.names().count()), [45, 10, 10, 2]);
+    assert_eq!(kinds.map(|kind| kind.names().count()), [46, 10, 10, 2]);
 }
 
 /// A shipped benchmark's file as it is read as TOML.
@@ -188,8 +188,21 @@ fn the_benchmarks_of_traffic2026_differ_from_those_without_in_vehicles_speeds_an
         let table = table(name);
         table["traffic"]["demand"].as_array().unwrap().iter().filter_map(toml::Value::as_float).collect()
     };
-    assert!(demand("traffic2026-training").iter().all(|&trained| trained < 2100.0));
+    for name in ["traffic2026-training", "traffic2026-refinement"] {
+        assert!(demand(name).iter().all(|&trained| trained < 2100.0), "{name}");
+        let traffic = &table(name)["traffic"];
+        assert!(traffic.get("drivers").is_none() && traffic["rude"][1].as_float().unwrap() < 0.3, "{name}");
+    }
     assert_eq!(demand("traffic2026"), [300.0, 900.0, 1500.0, 2100.0]);
+    // A refinement has other roads, and loads beside the truck of traffic2026.
+    let (refinement, training) = (table("traffic2026-refinement"), table("traffic2026-training"));
+    assert_ne!(refinement["procedural"]["seed"], training["procedural"]["seed"]);
+    let vehicles = refinement["vehicle"].as_array().unwrap();
+    assert_eq!(vehicles[..2], table("laden2026")["vehicle"].as_array().unwrap()[..]);
+    assert_eq!((vehicles.len(), &vehicles[2]["file"], vehicles[2].get("model")), (3, &traffic["vehicle"], None));
+    for key in ["actions", "sensors", "observation", "start", "reward"] {
+        assert_eq!(refinement[key], training[key], "{key}");
+    }
 }
 
 #[test]
@@ -278,7 +291,7 @@ fn the_continuous_benchmarks_differ_from_those_with_levels_in_their_actions_alon
 fn every_name_gives_what_its_file_gives() {
     // The largest take minutes; the test of the large benchmarks reads them as text.
     let benchmarks: Vec<&str> = Kind::Benchmark.names().filter(|name| !LARGE.contains(name)).collect();
-    assert_eq!(benchmarks.len(), 43);
+    assert_eq!(benchmarks.len(), 44);
     for name in benchmarks {
         let named = Scenario::named(name).unwrap();
         let read = Scenario::read(&scenarios().join(name).with_extension("toml")).unwrap();

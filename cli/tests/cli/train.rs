@@ -142,7 +142,7 @@ fn a_training_file_is_found_by_its_name() {
     assert!(
         message.contains(
             "papre: is no training file: the program comes with default, best, lane, attard, gpu, as-run, laden, \
-            laden-50, transfer, transfer-refined, traffic, laden-gpu, paper"
+            laden-50, transfer, transfer-refined, traffic, traffic-refined, laden-gpu, paper"
         ),
         "{message}"
     );

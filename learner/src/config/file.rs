@@ -10,7 +10,7 @@ use crate::error::Error;
 use offtrack_evaluation::error::Error as Evaluation;
 
 /// The training files that come with the program.
-const SHIPPED: [(&str, &str); 13] = [
+const SHIPPED: [(&str, &str); 14] = [
     ("default", include_str!("../../configs/default.toml")),
     ("best", include_str!("../../configs/best.toml")),
     ("lane", include_str!("../../configs/lane.toml")),
@@ -22,6 +22,7 @@ const SHIPPED: [(&str, &str); 13] = [
     ("transfer", include_str!("../../configs/transfer.toml")),
     ("transfer-refined", include_str!("../../configs/transfer-refined.toml")),
     ("traffic", include_str!("../../configs/traffic.toml")),
+    ("traffic-refined", include_str!("../../configs/traffic-refined.toml")),
     ("laden-gpu", include_str!("../../configs/laden-gpu.toml")),
     ("paper", include_str!("../../configs/paper.toml")),
 ];

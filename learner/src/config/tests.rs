@@ -83,6 +83,7 @@ fn every_value_out_of_its_range_is_refused_with_its_key_and_what_would_do() {
 fn a_refinements_value_out_of_its_range_is_refused_with_its_key() {
     for (setting, expected) in [
         ("refinement.begin=1.0", "refinement.begin: 1; must lie in 0..0.99"),
+        ("refinement.logit_factor=0.0", "refinement.logit_factor: 0; must lie in 0.01..100"),
         ("refinement.n_steps=0", "refinement.n_steps: 0; must lie in 1.."),
         ("refinement.epochs=0", "refinement.epochs: 0; must lie in 1.."),
         ("refinement.batch=1", "refinement.batch: 1; must lie in 2.."),
@@ -242,7 +243,7 @@ fn a_benchmark_of_ones_own_takes_the_place_of_all_that_a_training_file_says_of_o
 fn every_training_file_reads_by_path_and_by_name() {
     let folder = files::repository().join("learner/configs");
     let files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
-    assert_eq!(files.len(), 13);
+    assert_eq!(files.len(), 14);
     for file in files {
         let by_path = Config::read(&file).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(Config::read(Path::new(file.file_stem().unwrap())).unwrap(), by_path);
@@ -251,7 +252,7 @@ fn every_training_file_reads_by_path_and_by_name() {
     assert!(
         message.contains(
             "papre: is no training file: the program comes with default, best, lane, attard, gpu, as-run, laden, \
-            laden-50, transfer, transfer-refined, traffic, laden-gpu, paper"
+            laden-50, transfer, transfer-refined, traffic, traffic-refined, laden-gpu, paper"
         ),
         "{message}"
     );

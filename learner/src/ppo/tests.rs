@@ -6,6 +6,7 @@ use offtrack::scenario::RewardChanges;
 fn settings() -> Refinement {
     Refinement {
         begin: 0.0,
+        logit_factor: 1.0,
         n_steps: 4,
         epochs: 2,
         batch: 16,
@@ -189,6 +190,20 @@ fn the_policy_stays_while_the_value_network_alone_learns() {
         assert_ne!(weights(&ppo.critic), before);
         assert_eq!(weights(&ppo.actor) == weights(&begun), iteration < 2, "{iteration}");
     }
+}
+
+#[test]
+fn a_policy_begins_with_its_logits_times_the_factor() {
+    let (begun, seen) = (actor(1, 3), matrix(TensorData::new(vec![-1.0, 0.5], [2, 1])));
+    let ppo = Ppo::new(&Refinement { logit_factor: 2.5, ..settings() }, &begun, 1).unwrap();
+    let logits = Pass::forward(&begun, seen.clone()).output;
+    for network in [&ppo.actor, &ppo.actor_ema] {
+        let found = Pass::forward(network, seen.clone()).output;
+        // A product of sums, and a sum of products.
+        assert!(found.iter().zip(&logits).all(|(found, logit)| (found - 2.5 * logit).abs() < 1e-5), "{found:?}");
+    }
+    let same = Ppo::new(&settings(), &begun, 1).unwrap();
+    assert_eq!(same.actor.parameters(), begun.parameters());
 }
 
 #[test]

@@ -95,6 +95,10 @@ mod tests {
             ("transfer2026-refinement", &["transfer2026", "transfer2026-random"]),
             ("laden2026-50-training", &["laden2026-50", "laden2026-50-random"]),
             ("traffic2026-training", &["traffic2026", "traffic2026-random"]),
+            (
+                "traffic2026-refinement",
+                &["traffic2026", "traffic2026-random", "traffic2026-laden", "traffic2026-large"],
+            ),
         ] {
             for other in others {
                 assert_eq!(difference(&named(trained), &named(other)), None, "{trained}, {other}");
