@@ -86,6 +86,10 @@ fn checkpoint_minutes() -> f64 {
     2.0
 }
 
+fn logit_factor() -> f64 {
+    1.0
+}
+
 /// Where the trucks and the learner are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -215,8 +219,8 @@ pub struct Learning {
 pub struct Refinement {
     /// Fraction of the budget after which it begins.
     pub begin: f64,
-    /// Factor of the logits that it begins with. The most probable action stays, others become rarer.
-    #[serde(default = "Refinement::logits_as_they_are")]
+    /// Factor of the logits that it begins with. The most probable action stays; above 1 others become rarer.
+    #[serde(default = "logit_factor")]
     pub logit_factor: f64,
     /// Steps of each truck that are learned from at a time.
     pub n_steps: usize,

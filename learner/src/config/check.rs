@@ -124,11 +124,6 @@ impl Learning {
 }
 
 impl Refinement {
-    /// What a file that does not say how much begins with.
-    pub(super) fn logits_as_they_are() -> f64 {
-        1.0
-    }
-
     fn check(&self, reader: &Reader) -> Result<(), Error> {
         reader.within("refinement.begin", self.begin, 0.0..=0.99, "")?;
         reader.within("refinement.logit_factor", self.logit_factor, 0.01..=100.0, "")?;

@@ -100,8 +100,9 @@ mod tests {
                 &["traffic2026", "traffic2026-random", "traffic2026-laden", "traffic2026-large"],
             ),
         ] {
+            let scenario = named(trained);
             for other in others {
-                assert_eq!(difference(&named(trained), &named(other)), None, "{trained}, {other}");
+                assert_eq!(difference(&scenario, &named(other)), None, "{trained}, {other}");
             }
         }
     }

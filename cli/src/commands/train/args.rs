@@ -6,8 +6,8 @@ use std::path::PathBuf;
 #[derive(Debug, Default, clap::Args)]
 pub struct Args {
     /// A training file: its path, or one of `default`, `best`, `lane`, `attard`, `as-run`, `laden`, `laden-50`,
-    /// `transfer`, `transfer-refined`, `traffic`, `traffic-refined`, `gpu`, `laden-gpu` and `paper`, which come with the
-    /// program. Without it `default`, in a program built for graphics devices `gpu`.
+    /// `transfer`, `transfer-refined`, `traffic`, `traffic-refined`, `gpu`, `laden-gpu` and `paper`, which come with
+    /// the program. Without it `default`, in a program built for graphics devices `gpu`.
     pub(super) config: Option<PathBuf>,
     /// A benchmark of your own, a path or a name: train on its training routes, with its own reward, and evaluate on
     /// its test routes. The policy is chosen on its validation routes. Where it has no training or no validation
