@@ -2,8 +2,8 @@
 //! what the cars cost.
 //!
 //! `cargo run --release -p offtrack-evaluation --example among_cars -- [TIMES] [RUDE] [DEMAND]...`: each route 3 times,
-//! no rude drivers, 300, 900, 1,500 and 2,100 veh/h unless stated. The time of a step is that of a truck on all cores,
-//! in ratio to the same actions on empty roads: both are driven in turns.
+//! no rude drivers, 300, 900, 1,500 and 2,100 veh/h unless stated. The time of a step is that of a truck on all cores:
+//! on empty roads, among cars, and among cars that it observes, by the same actions; medians of five turns.
 
 #[path = "../evaluation/tests/among_cars/driver.rs"]
 #[expect(clippy::unwrap_used, reason = "it is a helper of tests too")]
@@ -17,19 +17,30 @@ use offtrack::world::World;
 
 const SEED: u32 = 7;
 
-/// Time of a truck's step in each of two worlds by the same actions (us).
-fn replayed(worlds: [&Arc<World>; 2], times: usize, actions: &[Vec<u32>]) -> [f64; 2] {
-    let mut simulators = worlds.map(|world| simulator(world, times, SEED));
-    let (mut seconds, mut steps) = ([0.0; 2], [0; 2]);
+/// Turns in which the worlds are driven.
+const TURNS: usize = 5;
+
+/// Time of a truck's step in a world by these actions (us).
+fn replayed(world: &Arc<World>, times: usize, actions: &[Vec<u32>]) -> f64 {
+    let mut simulator = simulator(world, times, SEED);
+    let (mut seconds, mut steps) = (0.0, 0);
     for actions in actions {
-        for (index, simulator) in simulators.iter_mut().enumerate() {
-            steps[index] += simulator.batch().truck.iter().filter(|truck| truck.held == 0).count();
-            let begun = Instant::now();
-            simulator.step(actions).expect("the actions are the world's");
-            seconds[index] += begun.elapsed().as_secs_f64();
-        }
+        steps += simulator.batch().truck.iter().filter(|truck| truck.held == 0).count();
+        let begun = Instant::now();
+        simulator.step(actions).expect("the actions are the world's");
+        seconds += begun.elapsed().as_secs_f64();
     }
-    [0, 1].map(|index| seconds[index] * 1e6 / steps[index] as f64)
+    seconds * 1e6 / steps as f64
+}
+
+/// Medians of these times in each of some worlds, which are driven in turns.
+fn medians<const N: usize>(worlds: [&Arc<World>; N], times: usize, actions: &[Vec<u32>]) -> [f64; N] {
+    let turns = [(); TURNS].map(|()| worlds.map(|world| replayed(world, times, actions)));
+    std::array::from_fn(|index| {
+        let mut all = turns.map(|turn| turn[index]);
+        all.sort_by(f64::total_cmp);
+        all[TURNS / 2]
+    })
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -39,7 +50,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let demands = numbers.get(2..).filter(|demands| !demands.is_empty()).unwrap_or(&[300.0, 900.0, 1500.0, 2100.0]);
     for demand in demands {
         let (mut scenario, world) = world(&format!("demand = [{demand}]\nvans = 0.25\nrude = {rude}\n"));
-        scenario.traffic = None;
+        scenario.observes_vehicles = true;
+        let observed = Arc::new(World::bake(&scenario)?);
+        (scenario.traffic, scenario.observes_vehicles) = (None, false);
         let empty = Arc::new(World::bake(&scenario)?);
         let Ends {
             arrived,
@@ -56,11 +69,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         } = driven(&world, times, SEED);
         let n = (arrived + met_vehicle + was_met + touched_kerb + other) as f64;
         let percent = |count: usize| 100.0 * count as f64 / n;
-        let [among, alone] = replayed([&world, &empty], times, &actions);
+        let [alone, among, observing] = medians([&empty, &world, &observed], times, &actions);
         println!(
             "{demand} veh/h: {n} episodes, arrived {:.1} %, met a vehicle {:.1} %, was met {:.2} % {met_on:?}, \
-             kerb {:.1} %, other {:.1} %, {overlaps} overlaps of cars, hard brakings an episode {:.2}; {:.1} cars, \
-             {among:.2} us a step, ratio to an empty road {:.2}",
+             kerb {:.1} %, other {:.1} %, {overlaps} overlaps of cars, hard brakings an episode {:.2}; {:.1} cars; \
+             {alone:.2} us a step on an empty road, {:.2} times that among cars, {:.2} where they are observed",
             percent(arrived),
             percent(met_vehicle),
             percent(was_met),
@@ -68,7 +81,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             percent(other),
             hard_brakings as f64 / n,
             cars as f64 / steps as f64,
-            among / alone
+            among / alone,
+            observing / alone
         );
     }
     Ok(())

@@ -13,7 +13,7 @@ use crate::layout::shared::constants;
 use crate::layout::{MOST_IN_GROUP, N_AROUND, N_CARS, N_NEAREST, first_of_vehicles};
 use crate::traffic::car::Outline;
 use crate::traffic::units::{length, metres};
-use crate::traffic::{self, Car, Kind, Network, Stretch, outlines, stretched};
+use crate::traffic::{self, Car, Kind, Network, Stretch, Zone, is_within, outlines, stretched};
 use crate::world::{Traffic, World};
 
 constants! {
@@ -55,17 +55,15 @@ constants! {
     const NEAREST_AT: usize = first_of_vehicles("vehicle");
 }
 
+/// Added to a bound, so that what it leaves out is left out by real numbers too (m).
+const SURELY: f32 = 0.01;
+
 /// What the row's truck observes of other vehicles; none where the world's trucks do not.
 pub fn around(world: &World, row: &Row) -> Option<[f32; N_AROUND]> {
     let shared = world.traffic.as_ref().filter(|shared| shared.is_observed)?;
     let cars = &traffic::Row::of(row.cars.as_ref()?).cars;
     let (truck, rig) = (&row.truck, world.rig(row.truck));
     let network = &shared.road(world, truck.route).network;
-    let cars = cars.iter().filter(|car| car.is_there()).map(|car| Other::car(network, car));
-    let others = row.mates.iter().filter(|mate| mate.is_there() && mate.env != row.env);
-    let others = others.map(|mate| Other::truck(world, shared, mate));
-    let mut seen = [const { None }; N_OTHERS];
-    cars.chain(others).zip(&mut seen).for_each(|(other, place)| *place = Some(other));
     let observing = Observing {
         network,
         path: shared.routes[truck.route as usize].path as usize,
@@ -76,7 +74,16 @@ pub fn around(world: &World, row: &Row) -> Option<[f32; N_AROUND]> {
         origin: truck.position,
         along: direction(truck.heading),
     };
-    Some(observing.of(&seen))
+    let cars = cars.iter().filter(|car| car.is_there()).map(|car| observing.seen(car));
+    let others = row.mates.iter().filter(|mate| mate.is_there() && mate.env != row.env);
+    let others = others.map(|mate| Other::truck(world, shared, mate));
+    let mut seen = [const { None }; N_OTHERS];
+    let mut n = 0;
+    for (other, place) in cars.chain(others).zip(&mut seen) {
+        *place = Some(other);
+        n += 1;
+    }
+    Some(observing.of(&seen[..n]))
 }
 
 /// Another vehicle: a car, or a truck of the same group.
@@ -88,25 +95,13 @@ struct Other {
     speed: f32,
     /// Its length (m).
     length: f32,
-    /// The ground that it covers; most cars are one unit.
+    /// The ground that it covers; most cars are one unit. None of a car that is too far away to be observed one by one.
     units: [Option<Outline>; 2],
-    /// Whether it is no truck of the group.
-    is_car: bool,
+    /// The car, if it is no truck of the group.
+    car: Option<Car>,
 }
 
 impl Other {
-    fn car(network: &Network, car: &Car) -> Other {
-        let mut units = car.outlines(network);
-        Other {
-            path: car.path(),
-            station: car.station(),
-            speed: car.speed(),
-            length: car.length(),
-            units: [units.next(), units.next()],
-            is_car: true,
-        }
-    }
-
     fn truck(world: &World, shared: &Traffic, mate: &Mate) -> Other {
         let rig = world.rig(&mate.truck);
         Other {
@@ -115,7 +110,7 @@ impl Other {
             speed: mate.truck.speed,
             length: metres(stretched(rig)),
             units: outlines(rig, &mate.truck).map(Some),
-            is_car: false,
+            car: None,
         }
     }
 
@@ -124,8 +119,9 @@ impl Other {
     }
 
     /// Unit vector along it, along the tractor of a truck.
-    fn along(&self) -> Vec2 {
-        self.units().next().map_or(Vec2::ZERO, |unit| unit.along)
+    fn along(&self, network: &Network) -> Vec2 {
+        let of_car = || self.car.and_then(|car| car.outlines(network).next());
+        self.units().next().copied().or_else(of_car).map_or(Vec2::ZERO, |unit| unit.along)
     }
 }
 
@@ -134,7 +130,7 @@ const N_OTHERS: usize = N_CARS + MOST_IN_GROUP - 1;
 const N_UNITS: usize = 2 * N_OTHERS;
 
 /// The vehicles around a truck.
-type Others = [Option<Other>; N_OTHERS];
+type Others = [Option<Other>];
 
 /// A zone of the truck's path with that of a car, in metres.
 struct Meeting {
@@ -145,6 +141,36 @@ struct Meeting {
     /// Station on the car's path less that on the truck's.
     delta: f32,
     kind: Kind,
+}
+
+impl Meeting {
+    fn of(zone: &Zone) -> Meeting {
+        let Stretch { a_in, a_out, b_in, b_out, delta, kind, .. } = zone.stretch();
+        Meeting { own: [a_in, a_out].map(metres), its: [b_in, b_out].map(metres), delta: metres(delta), kind }
+    }
+
+    /// Whether vehicles pass beside each other there.
+    fn is_beside(&self) -> bool {
+        matches!(self.kind, Kind::Soft | Kind::Wide)
+    }
+}
+
+/// A unit of another vehicle near the truck.
+#[derive(Clone, Copy)]
+struct Near<'a> {
+    /// Distance from the nearer of the truck's units (m).
+    distance: f32,
+    /// Of two that are as near the one of the lower number is first.
+    number: usize,
+    unit: &'a Outline,
+    /// Speed of the vehicle (m/s).
+    speed: f32,
+}
+
+impl Near<'_> {
+    fn is_before(&self, other: &Near) -> bool {
+        self.distance.total_cmp(&other.distance).then(self.number.cmp(&other.number)).is_lt()
+    }
 }
 
 /// A vehicle that comes to the entry.
@@ -183,60 +209,67 @@ struct Observing<'a> {
 }
 
 impl Observing<'_> {
+    /// A car as it is observed.
+    fn seen(&self, car: &Car) -> Other {
+        let [tractor, trailer] = &self.units;
+        let middle = 0.5 * (tractor.middle + trailer.middle);
+        let reach = |unit: &Outline| unit.middle.distance(middle) + unit.half_length + unit.half_width;
+        let reach = reach(tractor).max(reach(trailer)) + NEAR_SCALE + SURELY;
+        let mut units =
+            is_within(self.network, car, middle, reach).then(|| car.outlines(self.network)).into_iter().flatten();
+        Other {
+            path: car.path(),
+            station: car.station(),
+            speed: car.speed(),
+            length: car.length(),
+            units: [units.next(), units.next()],
+            car: Some(*car),
+        }
+    }
+
     /// What it observes of these vehicles.
     fn of(&self, others: &Others) -> [f32; N_AROUND] {
         let mut seen = [1.0; N_AROUND];
-        self.write_entry(others, &mut seen);
         let line = self.network.paths[self.path].line();
         seen[LINE_AT] = ((line - self.front) / GAP_SCALE).clamp(0.0, 1.0);
         seen[HAS_ENTERED_AT] = f32::from(line < self.front);
-        if let Some((gap, other)) = self.gap(others) {
+        if let Some((gap, other)) = self.write_entry(others, &mut seen) {
             let ahead = self.network.pose(self.path, self.front + gap).1;
-            let along = other.along().dot(ahead);
+            let along = other.along(self.network).dot(ahead);
             seen[GAP_AT] = (gap / GAP_SCALE).min(1.0);
             seen[GAP_SPEED_AT] = (other.speed * along / VEHICLE_SPEED_SCALE).clamp(-1.0, 1.0);
         }
-        for (unit, room) in self.units.iter().zip(&mut seen[ROOM_AT..]) {
-            let rooms = others.iter().flatten().flat_map(Other::units).map(|outline| room_between(unit, outline));
-            *room = rooms.fold(ROOM_SCALE, f32::min) / ROOM_SCALE;
-        }
-        self.write_nearest(others, &mut seen[NEAREST_AT..]);
+        self.write_near(others, &mut seen);
         seen
     }
 
-    /// The zones of the truck's path with that of another vehicle.
-    fn zones(&self, other: &Other) -> impl Iterator<Item = Meeting> {
-        self.network.zones_of(self.path, other.path).iter().map(|zone| {
-            let Stretch { a_in, a_out, b_in, b_out, delta, kind, .. } = zone.stretch();
-            Meeting { own: [a_in, a_out].map(metres), its: [b_in, b_out].map(metres), delta: metres(delta), kind }
-        })
-    }
-
-    /// Writes the first vehicle that comes to the entry, by lane.
-    fn write_entry(&self, others: &Others, seen: &mut [f32; N_AROUND]) {
+    /// Writes the first vehicle that comes to the entry, by lane; returns the distance to what is next on the truck's
+    /// path (m), and what it is.
+    fn write_entry<'o>(&self, others: &'o Others, seen: &mut [f32; N_AROUND]) -> Option<(f32, &'o Other)> {
         let line = self.network.paths[self.path].line();
         let mut first: [Option<Coming>; 2] = [None; 2];
+        let mut next: Option<(f32, &Other)> = None;
         for other in others.iter().flatten() {
-            let &Other { station, speed, length, .. } = other;
             let its_line = self.network.paths[other.path].line();
-            let waits = station + speed * speed / STILL_STOPS_WITH <= its_line;
-            let is_beside = |kind: Kind| matches!(kind, Kind::Soft | Kind::Wide);
-            let is_of_entry =
-                |zone: &Meeting| zone.own[0] <= line + ENTRY_REACH && (is_beside(zone.kind) || line < zone.own[0]);
-            let touches = self.zones(other).any(|zone| is_of_entry(&zone) && zone.kind != Kind::Wide);
-            for Meeting { own, its, kind, .. } in self.zones(other).filter(is_of_entry) {
-                // A car that runs together with the truck leads it once it is through.
-                let end = if kind == Kind::Follow { its[0] } else { its[1] };
-                let has_left = own[1] < self.front - self.length || end < station - length;
-                if has_left || (waits && its_line < its[0]) || (touches && kind == Kind::Wide) {
-                    continue;
+            let waits = other.station + other.speed * other.speed / STILL_STOPS_WITH <= its_line;
+            // Zones beside which only a truck yields stand behind those that others meet in.
+            let mut meets_at_entry = false;
+            for zone in self.network.zones_of(self.path, other.path) {
+                let zone = Meeting::of(zone);
+                if zone.own[0] <= line + ENTRY_REACH && (zone.is_beside() || line < zone.own[0]) {
+                    let counts = zone.kind != Kind::Wide || !meets_at_entry;
+                    meets_at_entry |= zone.kind != Kind::Wide;
+                    let hinders = counts && !(waits && its_line < zone.its[0]);
+                    if let Some(coming) = hinders.then(|| self.coming(&zone, other)).flatten() {
+                        let lane = &mut first[usize::from(zone.is_beside() || line + NEAREST_LANE < zone.own[0])];
+                        *lane = Some(lane.map_or(coming, |known| known.first(coming)));
+                    }
                 }
-                let speed = speed.max(LEAST_COMING_SPEED);
-                let distance = (its[0] - station).max(0.0);
-                let gone = (end + length - station) / speed;
-                let coming = Coming { arrival: distance / speed, distance, gone };
-                let lane = &mut first[usize::from(is_beside(kind) || line + NEAREST_LANE < own[0])];
-                *lane = Some(lane.map_or(coming, |known| known.first(coming)));
+                if let Some(gap) = self.gap(&zone, other)
+                    && next.is_none_or(|(known, _)| gap < known)
+                {
+                    next = Some((gap, other));
+                }
             }
         }
         for (lane, coming) in first.iter().enumerate() {
@@ -245,58 +278,76 @@ impl Observing<'_> {
             seen[DISTANCE_AT + lane] = (distance / GAP_SCALE).min(1.0);
             seen[GONE_AT + lane] = (gone / TIME_SCALE).min(1.0);
         }
+        next
     }
 
-    /// Distance to what is next on the truck's path (m), and what it is.
-    fn gap<'o>(&self, others: &'o Others) -> Option<(f32, &'o Other)> {
-        let mut least: Option<(f32, &Other)> = None;
-        for other in others.iter().flatten() {
-            let (station, rear) = (other.station, other.station - other.length);
-            for Meeting { own, its, delta, kind } in self.zones(other) {
-                if its[1] <= rear || station <= its[0] {
-                    continue;
+    /// When another vehicle is in a zone of the entry; none if it or the truck has left that.
+    fn coming(&self, zone: &Meeting, other: &Other) -> Option<Coming> {
+        let Meeting { own, its, kind, .. } = zone;
+        let &Other { station, speed, length, .. } = other;
+        // A car that runs together with the truck leads it once it is through.
+        let end = if *kind == Kind::Follow { its[0] } else { its[1] };
+        if own[1] < self.front - self.length || end < station - length {
+            return None;
+        }
+        let speed = speed.max(LEAST_COMING_SPEED);
+        let distance = (its[0] - station).max(0.0);
+        Some(Coming { arrival: distance / speed, distance, gone: (end + length - station) / speed })
+    }
+
+    /// Distance to another vehicle that is in a zone ahead (m).
+    fn gap(&self, zone: &Meeting, other: &Other) -> Option<f32> {
+        let &Meeting { own, its, delta, kind } = zone;
+        let (station, rear) = (other.station, other.station - other.length);
+        if its[1] <= rear || station <= its[0] {
+            return None;
+        }
+        let gap = match kind {
+            Kind::Follow if self.front < station - delta => (rear - delta).max(own[0]) - self.front,
+            Kind::Cross if self.front < own[1] => own[0] - self.front,
+            _ => return None,
+        };
+        Some(gap.max(0.0))
+    }
+
+    /// Writes the room of either unit, and the units nearest to them.
+    fn write_near(&self, others: &Others, seen: &mut [f32; N_AROUND]) {
+        let mut rooms = [ROOM_SCALE; 2];
+        let mut nearest: [Option<Near>; N_NEAREST] = [None; N_NEAREST];
+        for (index, other) in others.iter().flatten().enumerate() {
+            for (unit, outline) in other.units().enumerate() {
+                let squared = self.units.each_ref().map(|own| own.distance_squared(outline.middle));
+                for ((own, room), squared) in self.units.iter().zip(&mut rooms).zip(squared) {
+                    let least = squared.sqrt() - (outline.half_length + outline.half_width) - SURELY;
+                    if least < *room {
+                        *room = room.min(room_between(own, outline));
+                    }
                 }
-                let gap = match kind {
-                    Kind::Follow if self.front < station - delta => (rear - delta).max(own[0]) - self.front,
-                    Kind::Cross if self.front < own[1] => own[0] - self.front,
-                    _ => continue,
-                };
-                let gap = gap.max(0.0);
-                if least.is_none_or(|(known, _)| gap < known) {
-                    least = Some((gap, other));
+                let distance = squared.into_iter().fold(f32::INFINITY, f32::min).sqrt();
+                if distance < NEAR_SCALE {
+                    // Trailers of cars stand behind all other units.
+                    let behind = if other.car.is_some() && unit == 1 { N_UNITS } else { 0 };
+                    let near = Near { distance, number: 2 * index + unit + behind, unit: outline, speed: other.speed };
+                    let is_behind = |known: &Option<Near>| known.is_none_or(|known| near.is_before(&known));
+                    if let Some(place) = nearest.iter().position(is_behind) {
+                        nearest[place..].rotate_right(1);
+                        nearest[place] = Some(near);
+                    }
                 }
             }
         }
-        least
+        for (value, room) in seen[ROOM_AT..].iter_mut().zip(rooms) {
+            *value = room / ROOM_SCALE;
+        }
+        self.write_nearest(&nearest, &mut seen[NEAREST_AT..]);
     }
 
     /// Writes the vehicles nearest to either unit.
-    fn write_nearest(&self, others: &Others, seen: &mut [f32]) {
-        let distance = |outline: &Outline| {
-            self.units.iter().map(|unit| unit.distance_squared(outline.middle)).fold(f32::INFINITY, f32::min).sqrt()
-        };
-        // Trailers of cars stand behind all other units.
-        let number = |index: usize, unit: usize, other: &Other| {
-            2 * index + unit + if other.is_car && unit == 1 { N_UNITS } else { 0 }
-        };
-        let of_other = |(index, other)| {
-            let numbered = Other::units(other).enumerate();
-            numbered.map(move |(unit, outline)| (number(index, unit, other), outline, other.speed))
-        };
-        let units = others.iter().flatten().enumerate().flat_map(of_other);
-        let mut near = [None; N_UNITS];
-        for ((number, unit, speed), place) in units.zip(&mut near) {
-            *place = Some((distance(unit), number, unit, speed)).filter(|&(distance, ..)| distance < NEAR_SCALE);
-        }
-        // Of two that are as near the one in the lower slot is first.
-        near.sort_unstable_by(|a, b| match (a, b) {
-            (Some(a), Some(b)) => a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)),
-            _ => a.is_none().cmp(&b.is_none()),
-        });
+    fn write_nearest(&self, nearest: &[Option<Near>; N_NEAREST], seen: &mut [f32]) {
         seen.fill(0.0);
-        for (rank, &(_, _, outline, speed)) in near.iter().flatten().take(N_NEAREST).enumerate() {
-            let to = (outline.middle - self.origin) / NEAR_SCALE;
-            let velocity = speed / VEHICLE_SPEED_SCALE * outline.along;
+        for (rank, &Near { unit, speed, .. }) in nearest.iter().flatten().enumerate() {
+            let to = (unit.middle - self.origin) / NEAR_SCALE;
+            let velocity = speed / VEHICLE_SPEED_SCALE * unit.along;
             let in_frame = |vector: Vec2| [vector.dot(self.along), self.along.perp_dot(vector)];
             let ([ahead, left], [speed_ahead, speed_left]) = (in_frame(to), in_frame(velocity));
             for (group, value) in [1.0, ahead, left, speed_ahead, speed_left].into_iter().enumerate() {
@@ -306,12 +357,8 @@ impl Observing<'_> {
     }
 }
 
-/// Distance between two rectangles, at most [`ROOM_SCALE`]: that of the corners of each from the other (m).
+/// Distance between two rectangles: that of the corners of each from the other (m).
 fn room_between(one: &Outline, other: &Outline) -> f32 {
-    let reach = |outline: &Outline| outline.half_length + outline.half_width;
-    if ROOM_SCALE + reach(one) + reach(other) < one.middle.distance(other.middle) {
-        return ROOM_SCALE;
-    }
     if one.overlaps(other) {
         return 0.0;
     }
@@ -319,8 +366,8 @@ fn room_between(one: &Outline, other: &Outline) -> f32 {
         let (along, across) = (outline.half_length * outline.along, outline.half_width * outline.along.perp());
         [along + across, along - across, -along + across, -along - across].map(|corner| outline.middle + corner)
     };
-    let from = |corners: [Vec2; 4], outline: &Outline| corners.map(|corner| outline.distance_squared(corner).sqrt());
-    [from(corners(one), other), from(corners(other), one)].into_iter().flatten().fold(ROOM_SCALE, f32::min)
+    let from = |corners: [Vec2; 4], outline: &Outline| corners.map(|corner| outline.distance_squared(corner));
+    [from(corners(one), other), from(corners(other), one)].into_iter().flatten().fold(f32::INFINITY, f32::min).sqrt()
 }
 
 #[cfg(test)]

@@ -85,12 +85,8 @@ pub fn touched(network: &Network, own: &Met, cars: &[Car]) -> Option<Contact> {
     let now = outlines(rig, truck);
     let [tractor, trailer] = now;
     let middle = 0.5 * (tractor.middle + trailer.middle);
-    let reach = 0.5 * tractor.middle.distance(trailer.middle) + tractor.half_length.max(trailer.half_length) + NEAR_CAR;
-    let is_near = |car: &Car| {
-        let reach = reach + if car.is_large() { LONGER_THAN_CAR } else { 0.0 };
-        front(network, car).distance_squared(middle) < reach * reach
-    };
-    let near = cars.iter().enumerate().filter(|(_, car)| car.is_there() && is_near(car));
+    let reach = 0.5 * tractor.middle.distance(trailer.middle) + tractor.half_length.max(trailer.half_length);
+    let near = cars.iter().enumerate().filter(|(_, car)| car.is_there() && is_within(network, car, middle, reach));
     let contacts = near.filter_map(|(slot, car)| {
         let touches =
             |units: &[Outline; 2]| car.outlines(network).any(|its| units.iter().any(|unit| unit.overlaps(&its)));
@@ -100,6 +96,12 @@ pub fn touched(network: &Network, own: &Met, cars: &[Car]) -> Option<Contact> {
         })
     });
     contacts.min_by_key(Contact::order)
+}
+
+/// Whether a part of a car may be within a distance of a point (m).
+pub fn is_within(network: &Network, car: &Car, point: Vec2, distance: f32) -> bool {
+    let reach = distance + NEAR_CAR + if car.is_large() { LONGER_THAN_CAR } else { 0.0 };
+    front(network, car).distance_squared(point) < reach * reach
 }
 
 /// The contact of a truck with another one, which has an index in their group, if they touch. Each is judged as it is

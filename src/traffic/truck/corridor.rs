@@ -2,6 +2,7 @@
 //! will be there, and brake for what they would touch.
 
 use glam::Vec2;
+use multiversion::multiversion;
 
 use super::contact::LONGER_THAN_CAR;
 use super::view::View;
@@ -68,25 +69,26 @@ impl Points {
         }
         points
     }
+}
 
-    /// Squared distance of each to the nearest of some rectangles, 0 inside them (m²), but for those that the corridor,
-    /// which begins at a point, cannot reach.
-    fn to_nearest(&self, outlines: &[Outline], begins: Vec2) -> [f32; CORRIDOR_SAMPLES] {
-        let mut nearest = [f32::MAX; CORRIDOR_SAMPLES];
-        for Outline { middle, along, half_length, half_width } in outlines {
-            let reach = REACH + half_length + half_width;
-            if reach * reach < middle.distance_squared(begins) {
-                continue;
-            }
-            for (nearest, (x, y)) in nearest.iter_mut().zip(self.x.iter().zip(&self.y)) {
-                let (x, y) = (x - middle.x, y - middle.y);
-                let ahead = ((x * along.x + y * along.y).abs() - half_length).max(0.0);
-                let aside = ((y * along.x - x * along.y).abs() - half_width).max(0.0);
-                *nearest = nearest.min(ahead * ahead + aside * aside);
-            }
+/// Squared distance of each point to the nearest of some rectangles, 0 inside them (m²), but for those that the
+/// corridor, which begins at a point, cannot reach.
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+fn to_nearest(points: &Points, outlines: &[Outline], begins: Vec2) -> [f32; CORRIDOR_SAMPLES] {
+    let mut nearest = [f32::MAX; CORRIDOR_SAMPLES];
+    for Outline { middle, along, half_length, half_width } in outlines {
+        let reach = REACH + half_length + half_width;
+        if reach * reach < middle.distance_squared(begins) {
+            continue;
         }
-        nearest
+        for (nearest, (x, y)) in nearest.iter_mut().zip(points.x.iter().zip(&points.y)) {
+            let (x, y) = (x - middle.x, y - middle.y);
+            let ahead = ((x * along.x + y * along.y).abs() - half_length).max(0.0);
+            let aside = ((y * along.x - x * along.y).abs() - half_width).max(0.0);
+            *nearest = nearest.min(ahead * ahead + aside * aside);
+        }
     }
+    nearest
 }
 
 /// Takes the ground that a truck covers into account.
@@ -102,7 +104,7 @@ pub(super) fn mind(view: &View, driver: &mut Driver) {
     let station = |index: usize| (first + index) as f32 * SPACING;
     let beside = |index: usize| if station(index) < car.station() { ROOM_AT_FRONT } else { CORRIDOR_ROOM };
     let room = |index: usize| points.half_widths[index] + beside(index);
-    let now = points.to_nearest(&view.now, at_front);
+    let now = to_nearest(&points, &view.now, at_front);
     let leader = (0..samples.len()).find(|&index| now[index] < room(index) * room(index));
     if let Some(index) = leader {
         let rear = length(station(index) - BEFORE_SAMPLE);
@@ -116,7 +118,7 @@ pub(super) fn mind(view: &View, driver: &mut Driver) {
         driver.note_leader(rear, speed);
     }
     if !view.waits && !car.is_rude() {
-        let later = points.to_nearest(&view.later, at_front);
+        let later = to_nearest(&points, &view.later, at_front);
         let room = |index: usize| points.half_widths[index] + ROOM_LATER;
         let before = leader.unwrap_or(samples.len());
         if let Some(index) = (0..before).find(|&index| later[index] < room(index) * room(index)) {
@@ -163,7 +165,7 @@ pub(super) fn ahead(view: &View, network: &Network, car: &Car) -> Option<(i32, i
     }
     let samples = corridor(network, car, 0);
     let points = Points::of(network, car, 0, samples);
-    let now = points.to_nearest(&view.now, samples[0].position);
+    let now = to_nearest(&points, &view.now, samples[0].position);
     let room = |index: usize| points.half_widths[index] + CORRIDOR_ROOM;
     let index = (0..samples.len()).find(|&index| now[index] < room(index) * room(index))?;
     let speed = speed(view.velocity.dot(samples[index].direction).max(0.0));

@@ -39,9 +39,7 @@ fn view(network: &Network, path: usize, front: f32) -> Observing<'_> {
 
 /// What a truck observes of these cars.
 fn observed(view: &Observing, cars: &[Car; N_CARS]) -> [f32; N_AROUND] {
-    let there = cars.iter().filter(|car| car.is_there()).map(|car| Other::car(view.network, car));
-    let mut others = [const { None }; N_OTHERS];
-    there.zip(&mut others).for_each(|(other, place)| *place = Some(other));
+    let others: Vec<_> = cars.iter().filter(|car| car.is_there()).map(|car| Some(view.seen(car))).collect();
     view.of(&others)
 }
 
