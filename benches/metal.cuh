@@ -10,6 +10,11 @@ namespace metal {
 using uint = unsigned int;
 struct bool2 { bool x, y; };
 struct uint3 { uint x, y, z; };
+struct float3 {
+    float x, y, z;
+    float3() = default;
+    HERE constexpr float3(float a, float b, float c) : x(a), y(b), z(c) {}
+};
 #define VECTOR2(V, T, N) \
     struct __align__(8) V { \
         T x, y; \
