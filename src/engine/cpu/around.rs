@@ -13,7 +13,7 @@ use crate::layout::shared::constants;
 use crate::layout::{MOST_IN_GROUP, N_AROUND, N_CARS, N_NEAREST, first_of_vehicles};
 use crate::traffic::car::Outline;
 use crate::traffic::units::{length, metres};
-use crate::traffic::{self, Car, Kind, Network, Stretch, Zone, is_within, outlines, stretched};
+use crate::traffic::{self, Car, Kind, Network, Stretch, Zone, may_be_within, outlines, stretched};
 use crate::world::{Traffic, World};
 
 constants! {
@@ -74,15 +74,11 @@ pub fn around(world: &World, row: &Row) -> Option<[f32; N_AROUND]> {
         origin: truck.position,
         along: direction(truck.heading),
     };
-    let cars = cars.iter().filter(|car| car.is_there()).map(|car| observing.seen(car));
     let others = row.mates.iter().filter(|mate| mate.is_there() && mate.env != row.env);
     let others = others.map(|mate| Other::truck(world, shared, mate));
     let mut seen = [const { None }; N_OTHERS];
-    let mut n = 0;
-    for (other, place) in cars.chain(others).zip(&mut seen) {
-        *place = Some(other);
-        n += 1;
-    }
+    let places = observing.cars(cars).chain(others).zip(&mut seen);
+    let n = places.map(|(other, place)| *place = Some(other)).count();
     Some(observing.of(&seen[..n]))
 }
 
@@ -209,22 +205,20 @@ struct Observing<'a> {
 }
 
 impl Observing<'_> {
-    /// A car as it is observed.
-    fn seen(&self, car: &Car) -> Other {
-        let [tractor, trailer] = &self.units;
-        let middle = 0.5 * (tractor.middle + trailer.middle);
-        let reach = |unit: &Outline| unit.middle.distance(middle) + unit.half_length + unit.half_width;
-        let reach = reach(tractor).max(reach(trailer)) + NEAR_SCALE + SURELY;
-        let mut units =
-            is_within(self.network, car, middle, reach).then(|| car.outlines(self.network)).into_iter().flatten();
-        Other {
-            path: car.path(),
-            station: car.station(),
-            speed: car.speed(),
-            length: car.length(),
-            units: [units.next(), units.next()],
-            car: Some(*car),
-        }
+    /// The cars of a row, as they are observed.
+    fn cars(&self, cars: &[Car]) -> impl Iterator<Item = Other> {
+        let is_near = may_be_within(self.network, &self.units, NEAR_SCALE);
+        cars.iter().filter(|car| car.is_there()).map(move |car| {
+            let mut units = is_near(car).then(|| car.outlines(self.network)).into_iter().flatten();
+            Other {
+                path: car.path(),
+                station: car.station(),
+                speed: car.speed(),
+                length: car.length(),
+                units: [units.next(), units.next()],
+                car: Some(*car),
+            }
+        })
     }
 
     /// What it observes of these vehicles.
@@ -260,7 +254,7 @@ impl Observing<'_> {
                     let counts = zone.kind != Kind::Wide || !meets_at_entry;
                     meets_at_entry |= zone.kind != Kind::Wide;
                     let hinders = counts && !(waits && its_line < zone.its[0]);
-                    if let Some(coming) = hinders.then(|| self.coming(&zone, other)).flatten() {
+                    if hinders && let Some(coming) = self.coming(&zone, other) {
                         let lane = &mut first[usize::from(zone.is_beside() || line + NEAREST_LANE < zone.own[0])];
                         *lane = Some(lane.map_or(coming, |known| known.first(coming)));
                     }

@@ -83,10 +83,8 @@ pub struct Met<'a> {
 pub fn touched(network: &Network, own: &Met, cars: &[Car]) -> Option<Contact> {
     let Met { rig, truck, entry } = own;
     let now = outlines(rig, truck);
-    let [tractor, trailer] = now;
-    let middle = 0.5 * (tractor.middle + trailer.middle);
-    let reach = 0.5 * tractor.middle.distance(trailer.middle) + tractor.half_length.max(trailer.half_length);
-    let near = cars.iter().enumerate().filter(|(_, car)| car.is_there() && is_within(network, car, middle, reach));
+    let is_near = may_be_within(network, &now, 0.0);
+    let near = cars.iter().enumerate().filter(|(_, car)| car.is_there() && is_near(car));
     let contacts = near.filter_map(|(slot, car)| {
         let touches =
             |units: &[Outline; 2]| car.outlines(network).any(|its| units.iter().any(|unit| unit.overlaps(&its)));
@@ -98,10 +96,15 @@ pub fn touched(network: &Network, own: &Met, cars: &[Car]) -> Option<Contact> {
     contacts.min_by_key(Contact::order)
 }
 
-/// Whether a part of a car may be within a distance of a point (m).
-pub fn is_within(network: &Network, car: &Car, point: Vec2, distance: f32) -> bool {
-    let reach = distance + NEAR_CAR + if car.is_large() { LONGER_THAN_CAR } else { 0.0 };
-    front(network, car).distance_squared(point) < reach * reach
+/// Whether a part of a car may be within a distance of a truck's units (m).
+pub fn may_be_within(network: &Network, [tractor, trailer]: &[Outline; 2], distance: f32) -> impl Fn(&Car) -> bool {
+    let middle = 0.5 * (tractor.middle + trailer.middle);
+    let reach = 0.5 * tractor.middle.distance(trailer.middle) + tractor.half_length.max(trailer.half_length);
+    let reach = reach + distance + NEAR_CAR;
+    move |car| {
+        let reach = reach + if car.is_large() { LONGER_THAN_CAR } else { 0.0 };
+        front(network, car).distance_squared(middle) < reach * reach
+    }
 }
 
 /// The contact of a truck with another one, which has an index in their group, if they touch. Each is judged as it is

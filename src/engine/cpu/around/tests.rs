@@ -39,7 +39,7 @@ fn view(network: &Network, path: usize, front: f32) -> Observing<'_> {
 
 /// What a truck observes of these cars.
 fn observed(view: &Observing, cars: &[Car; N_CARS]) -> [f32; N_AROUND] {
-    let others: Vec<_> = cars.iter().filter(|car| car.is_there()).map(|car| Some(view.seen(car))).collect();
+    let others: Vec<_> = view.cars(cars).map(Some).collect();
     view.of(&others)
 }
 
