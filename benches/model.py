@@ -90,7 +90,7 @@ KNOWN = {
 RULES = [
     # attard2023 has no disturbances and observes no extras.
     (".*", r"late_action|perceive|\bseen|observe_extras|noise|reading|exact_range 2|begun|copy_first", False, "never"),
-    # Its trucks are alone and begin where their routes do; an episode follows in the same step, one of three places.
+    # Its trucks are alone and begin where their routes do; an episode follows in the same step, the last of three.
     (".*", r"start [12]|standing_at|free_route|n_free|drawn_below [23]", False, "never"),
     ("sense.*", r"block_sample 1", False, "ray block"),
     ("sense.*", r"block_sample 2", False, "ray second block"),
