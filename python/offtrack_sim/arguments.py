@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 #: Most names of routes that a batch takes: more than any benchmark has routes.
 MOST_NAMES = 10_000_000
@@ -18,8 +19,8 @@ MOST_VALUES = 1000
 
 
 def mode_name(mode: str | enum.Enum) -> str:
-    """``"next_step"`` for ``AutoresetMode.NEXT_STEP``, and so on."""
-    return mode.name.lower() if isinstance(mode, enum.Enum) else text("autoreset", mode)
+    """``"next_step"`` for ``AutoresetMode.NEXT_STEP`` or its name, and so on."""
+    return (mode.name if isinstance(mode, enum.Enum) else text("autoreset", mode)).lower()
 
 
 def checked_seed(seed: int) -> int:
@@ -49,6 +50,14 @@ def within(name: str, value: int, low: int, high: int) -> int:
     if not low <= index < high:
         raise ValueError(f"{name}: {index}; must lie in {low}..{high}")
     return index
+
+
+def check_commands(name: str, commands: npt.NDArray[Any]) -> None:
+    """An error for the first of some numbers that lies outside -1..1, as they were given: none is rounded before."""
+    outside = np.argwhere(~(abs(commands) <= 1))
+    if len(outside):
+        index = tuple(int(i) for i in outside[0])
+        raise ValueError(f"{name}[{', '.join(map(str, index))}]: {commands[index]}; must lie in -1..1")
 
 
 def names_of(routes: Iterable[str]) -> list[str]:
@@ -111,5 +120,8 @@ def weights_of(weights: Mapping[str, float]) -> list[tuple[str, float]]:
     for name, weight in weights.items():
         if not isinstance(weight, int | float | np.integer | np.floating):
             raise TypeError(f"weights[{name!r}]: {weight!r}; a number is needed")
-        pairs.append((text("weights", name), float(weight)))
+        try:
+            pairs.append((text("weights", name), float(weight)))
+        except OverflowError:
+            raise ValueError(f"weights[{name!r}]: too large for a float; must lie in 0..1e6") from None
     return pairs

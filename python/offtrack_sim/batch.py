@@ -109,7 +109,7 @@ class Batch(_offtrack.Batch):
         batch = super().__new__(
             cls,
             given(scenario),
-            min(checked_integer("num_envs", num_envs), 2**62),
+            max(-(2**62), min(checked_integer("num_envs", num_envs), 2**62)),
             split=text("split", split),
             routes=names,
             seed=checked_seed(seed),
@@ -301,9 +301,13 @@ class Batch(_offtrack.Batch):
         """Distance of points ``[n, 2]`` from the nearest kerb of a route's road [m], negative off the road, ``[n]``.
 
         Up to 5 m from a kerb it is within 1 cm, or 3 cm where two kerbs are equally near; beyond 7.5 m inside a solid
-        and 15.9 m from all kerbs it stays. Off the road's field everything is solid. The frame is that of :meth:`road`.
+        and 15.9 m from all kerbs it stays. Off the road's field everything is solid, and the value falls with the
+        distance from the field. The frame is that of :meth:`road`.
         """
-        found = np.asarray(points, dtype=np.float64)
+        try:
+            found = np.asarray(points, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise TypeError(f"points: {points!r}; numbers of shape (n, 2) are needed") from None
         if found.ndim != 2 or found.shape[1] != 2 or not np.isfinite(found).all():
             raise ValueError(f"points: {found.dtype} of shape {found.shape}; finite numbers of shape (n, 2) are needed")
         return self.kerb_distances(text("route", route), found)

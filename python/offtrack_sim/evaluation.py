@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _offtrack
-from .arguments import checked_integer, checked_seed, text
+from .arguments import check_commands, checked_integer, checked_seed, text
 from .batch import Batch
 from .layout import Ended
 from .policy import Policy
@@ -205,7 +205,10 @@ def _checked(actions: Any, n: int, n_commands: int) -> npt.NDArray[Any]:
         if found.dtype.kind != "f" or found.shape != (n, n_commands):
             needed = f"float32 of shape ({n}, {n_commands}) is needed"
             raise TypeError(f"policy: gave {found.dtype} of shape {found.shape}; {needed}")
-        return found.astype(np.float32, copy=False)
+        rounded = found.astype(np.float32, copy=False)
+        # The batch judges what it is given; what rounding would hide from it is judged here.
+        check_commands("actions", np.where(abs(rounded) <= 1, found, 0.0))
+        return rounded
     if found.dtype.kind not in "iu" or found.shape != (n,):
         raise TypeError(f"policy: gave {found.dtype} of shape {found.shape}; integers of shape ({n},) are needed")
     return found

@@ -216,9 +216,14 @@ class Observer(_offtrack.Observer):
 
         Raises:
             TypeError: For anything but an array of integers, or of numbers.
-            ValueError: For another shape, for an action outside the table, and a number outside -1..1.
+            ValueError: For another shape, for an action outside the table, a number outside -1..1, and a speed that is
+                not finite.
         """
-        return self.commands(actions, _numbers("target_speed", target_speed, (self.num_trucks,)).astype(np.float32))
+        speeds = _numbers("target_speed", target_speed, (self.num_trucks,))
+        if not np.isfinite(speeds).all():
+            truck = int(np.flatnonzero(~np.isfinite(speeds))[0])
+            raise ValueError(f"target_speed[{truck}]: {speeds[truck]}; a finite number is needed")
+        return self.commands(actions, speeds.astype(np.float32))
 
     def frame(self, route: str) -> Frame:
         """Where the road of a route lies in its map."""
@@ -245,6 +250,8 @@ class Observer(_offtrack.Observer):
         """Indices of trucks, none for all."""
         if trucks is None:
             return None
+        if isinstance(trucks, str) or not hasattr(trucks, "__len__"):
+            raise TypeError(f"trucks: {trucks!r}; indices of trucks are needed, or None for all")
         rows = [within(f"trucks[{row}]", truck, 0, self.num_trucks) for row, truck in enumerate(trucks)]
         if len(set(rows)) != len(rows):
             raise ValueError("trucks: one of them stands twice")

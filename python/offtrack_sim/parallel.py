@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import os
 from collections.abc import Iterable
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from pettingzoo import ParallelEnv
 
-from .arguments import checked_seed, names_of, within
+from .arguments import check_commands, checked_seed, names_of, within
 from .batch import Batch
 from .layout import Ended
 from .scenarios import Benchmark, Scenario, benchmark
@@ -68,7 +69,8 @@ class RoundaboutParallel(ParallelEnv[str, Observation, Any]):
         check_render_mode(render_mode)
         n_trucks = within("n_trucks", n_trucks, 1, MOST_TRUCKS + 1)
         if not isinstance(scenario, Benchmark):
-            scenario = benchmark(scenario) if isinstance(scenario, str) else Benchmark(scenario)  # type: ignore[arg-type]
+            is_named = isinstance(scenario, str | os.PathLike)
+            scenario = benchmark(scenario) if is_named else Benchmark(scenario)  # type: ignore[arg-type]
         if "traffic" not in scenario.keys:
             needed = (
                 "trucks share a road among other vehicles: a benchmark with a table [traffic] is needed, as traffic2026"
@@ -88,6 +90,10 @@ class RoundaboutParallel(ParallelEnv[str, Observation, Any]):
         self.render_size = render_size
         self._has_begun = False
 
+    def __copy__(self) -> RoundaboutParallel:
+        # A step of a copy that shared the batch would move this one's trucks.
+        return copy.deepcopy(self)
+
     def observation_space(self, agent: str) -> gymnasium.Space[Any]:
         return self.observation_spaces[agent]
 
@@ -98,6 +104,8 @@ class RoundaboutParallel(ParallelEnv[str, Observation, Any]):
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
         """Begins an episode of every truck. Options other than ``routes`` are for wrappers."""
+        if not isinstance(options, (dict, type(None))):
+            raise TypeError(f"options: {options!r}; a dict is needed, or None")
         n = len(self.possible_agents)
         if seed is None and not self._has_begun:
             seed = int(np.random.SeedSequence().generate_state(1)[0])
@@ -161,6 +169,8 @@ class RoundaboutParallel(ParallelEnv[str, Observation, Any]):
         kinds = "f" if isinstance(space, gymnasium.spaces.Box) else "iu"
         if found.dtype.kind not in kinds or found.shape != (space.shape or ()):
             raise TypeError(f"actions[{agent!r}]: {action!r}; one of {space} is needed")
+        if kinds == "f":
+            check_commands(f"actions[{agent!r}]", found)
         return found
 
     def render(self) -> npt.NDArray[np.uint8] | None:

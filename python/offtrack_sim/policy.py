@@ -124,7 +124,8 @@ class Policy:
             raise ValueError(f"{self.name}: observes other extras than {batch.scenario}: {its}; {needed} are needed")
         sees = getattr(batch, "observes_vehicles", False)
         if self.vehicles and not sees:
-            raise ValueError(f"{self.name}: observes other vehicles, which {batch.scenario} does not")
+            blind = batch.scenario if hasattr(batch, "observes_vehicles") else "an observer"
+            raise ValueError(f"{self.name}: observes other vehicles, which {blind} does not")
         if sees and not self.vehicles and self.values is None:
             raise ValueError(f"{self.name}: observes no other vehicles, as {batch.scenario} does")
         tables = self.action_table, batch.action_table

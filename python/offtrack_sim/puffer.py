@@ -27,7 +27,7 @@ class RoundaboutPuffer(pufferlib.PufferEnv):
       where they are continuous, ``[num_envs, n_commands]`` float32; a truck whose episode ends begins the next one in
       the same step.
     - Rewards ``[num_envs]`` float32 are the benchmark's times ``reward_scale``: PufferLib's trainer clamps rewards to
-      -1..1, and the benchmark's are -500 to +100.
+      -1..1, and the benchmark's are -501.5 to +200.
     - PufferLib 3.0's trainer cuts the future at ``terminals`` alone: an episode that the time limit ends runs on, for
       it, into the next one.
     - Infos are a list with one dict where episodes ended: ``is_success``, ``episode_return`` (unscaled) and
@@ -94,9 +94,11 @@ class RoundaboutPuffer(pufferlib.PufferEnv):
 
     def step(self, actions: npt.NDArray[Any]) -> Buffers:
         """One step of every truck, 0.1 s."""
+        # Trucks that share a road wait for each other.
+        waited = self.batch.waiting()
         self.batch.step_into(actions, self.observations, self.rewards, self.terminals, self.truncations)
         self._returns += self.rewards
-        self._lengths += 1
+        self._lengths += ~waited
         self.rewards *= self.reward_scale
         infos = []
         ends = self.batch.ended()

@@ -33,7 +33,7 @@ class RoundaboutVecEnv(VecEnv):
 
     With the same seeds every value is that of ``DummyVecEnv`` with as many :class:`offtrack_sim.Roundabout`. Wrap it in
     ``VecMonitor`` for returns and lengths of episodes, and in ``VecNormalize`` for rewards that a learner can fit: the
-    benchmark's are -500 to +100.
+    benchmark's are -501.5 to +200.
 
     Args:
         scenario: Benchmark, as for :class:`offtrack_sim.Batch`.
@@ -101,11 +101,11 @@ class RoundaboutVecEnv(VecEnv):
 
     def step_wait(self) -> tuple[Floats, Floats, Bools, list[dict[str, Any]]]:
         """One step of every truck, 0.1 s."""
+        waited = self.batch.waiting()
         observation, reward, terminated, truncated = self.batch.step(self._actions)
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         ends = self.batch.ended()
         if ends is not None:
-            routes, vehicles = self.batch.routes(), self.batch.vehicles()
             for env, code, route, last, vehicle in zip(*ends):
                 infos[env] = {
                     "terminal_observation": last,
@@ -114,6 +114,11 @@ class RoundaboutVecEnv(VecEnv):
                     "ended": int(code),
                     **self.batch.named(route, vehicle),
                 }
+                waited[env] = True
+        begun = np.flatnonzero(waited & ~self.batch.waiting())
+        if len(begun):
+            routes, vehicles = self.batch.routes(), self.batch.vehicles()
+            for env in begun:
                 self.reset_infos[env] = self.batch.named(routes[env], vehicles[env])
         return observation, reward, terminated | truncated, infos
 

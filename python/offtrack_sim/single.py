@@ -11,7 +11,7 @@ import gymnasium
 import numpy as np
 import numpy.typing as npt
 
-from .arguments import checked_seed
+from .arguments import check_commands, checked_seed
 from .batch import Batch
 from .layout import EXTRAS, OBSERVATION, VEHICLES, Ended
 from .scenarios import Scenario
@@ -84,7 +84,6 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], Any]):
         self.render_size = render_size
         self.numeric_infos = numeric_infos
         self._has_stream = False
-        self._needs_reset = True
 
     def __copy__(self) -> Roundabout:
         # A step of a copy that shared the batch would move this one's truck.
@@ -106,17 +105,15 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], Any]):
             starts=None if options.get("start") is None else [options["start"]],
         )
         self._has_stream = True
-        self._needs_reset = False
         return self.batch.observation()[0], self._named(self.batch.routes()[0], self.batch.vehicles()[0])
 
     def step(self, action: Any) -> tuple[npt.NDArray[np.float32], float, bool, bool, dict[str, Any]]:
-        if self._needs_reset:
+        if not self._has_stream or self.batch.waiting()[0]:
             raise gymnasium.error.ResetNeeded("call reset() before the first step and after the end of an episode")
         observation, reward, terminated, truncated = self.batch.step(self._row_of(action))
         info: dict[str, Any] = {}
         ended = self.batch.ended()
         if ended is not None:
-            self._needs_reset = True
             code = Ended(int(ended.codes[0]))
             info = {"ended": int(code), "is_success": code == Ended.ARRIVED}
             info |= self._named(ended.routes[0], ended.vehicles[0])
@@ -130,10 +127,7 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], Any]):
                 raise TypeError(f"action: {action!r}; float32 of shape {self.action_space.shape} is needed")
             if command.shape != self.action_space.shape:
                 raise ValueError(f"action: shape {command.shape}; {self.action_space.shape} is needed")
-            outside = ~(abs(command) <= 1)
-            if outside.any():
-                index = int(np.flatnonzero(outside)[0])
-                raise ValueError(f"action[{index}]: {command[index]}; must lie in -1..1")
+            check_commands("action", command)
             return command[None].astype(np.float32)
         try:
             index = operator.index(action)

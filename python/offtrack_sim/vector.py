@@ -40,7 +40,8 @@ class RoundaboutVector(Base):
     - ``batch`` is the simulator, with all its columns.
     - Infos have the form of Gymnasium's ``SyncVectorEnv``: an array ``key`` and a mask ``_key`` for ``route`` where an
       episode began and for ``ended``, ``is_success`` and ``route`` where one ended, and nothing where neither did. With
-      ``SAME_STEP`` those of the end are in ``final_info``, and ``final_obs`` has the last observations. Where the
+      ``SAME_STEP`` those of the end are in ``final_info``, and ``final_obs`` has the last observations. Trucks that
+      share a road begin together, see :meth:`offtrack_sim.Batch.waiting`. Where the
       benchmark has several vehicles or loads, ``vehicle`` and ``load`` stand beside ``route``. With ``numeric_infos``
       all of them are arrays of numbers.
     - Copies (``copy.copy``, ``copy.deepcopy``) and pickles go on from the state, independent of this environment.
@@ -102,10 +103,7 @@ class RoundaboutVector(Base):
         self.numeric_infos = numeric_infos
         self._outputs = None if copy else _outputs(num_envs, self.batch.n_values)
         self._seed = seed
-        self._is_next_step, self._is_same_step = mode == "next_step", mode == "same_step"
         self._has_begun = False
-        # Trucks that wait for their next episode.
-        self._has_ended = np.zeros(num_envs, dtype=np.bool_)
 
     def __copy__(self) -> RoundaboutVector:
         # A step of a copy that shared the batch would move this one's trucks.
@@ -136,8 +134,8 @@ class RoundaboutVector(Base):
         streams: list[tuple[int, int] | None]
         if seed is None:
             streams = [None if self._has_begun else (self._seed, env) for env in envs]
-        elif not isinstance(seed, Sequence | np.ndarray):
-            whole = checked_seed(seed)
+        elif not isinstance(seed, Sequence | np.ndarray) or getattr(seed, "ndim", 1) == 0:
+            whole = checked_seed(seed)  # type: ignore[arg-type]
             streams = [(whole, env) for env in envs]
         else:
             if isinstance(seed, str):
@@ -152,7 +150,6 @@ class RoundaboutVector(Base):
             starts=_chosen("starts", options.get("starts"), envs, self.num_envs),
         )
         self._has_begun = True
-        self._has_ended[envs] = False
         infos: dict[str, Any] = {}
         begun = np.zeros(self.num_envs, dtype=np.bool_)
         begun[envs] = True
@@ -170,17 +167,17 @@ class RoundaboutVector(Base):
         """
         if not self._has_begun:
             raise gymnasium.error.ResetNeeded("call reset() before the first step")
+        waited = self.batch.waiting()
         if self._outputs is None:
             observation, reward, terminated, truncated = self.batch.step(actions)
         else:
             observation, reward, terminated, truncated = self._outputs
             self.batch.step_into(actions, observation, reward, terminated, truncated)
         infos = self.batch.end_infos(self.numeric_infos) or {}
-        if self._is_next_step and self._has_ended.any():
-            # These have begun another episode in this step.
-            self._put_begun(infos, self._has_ended)
-        if not self._is_same_step:
-            self._has_ended = terminated | truncated
+        if waited.any():
+            begun = waited & ~self.batch.waiting()
+            if begun.any():
+                self._put_begun(infos, begun)
         return observation, reward, terminated, truncated, infos
 
     def render(self) -> tuple[npt.NDArray[np.uint8], ...] | None:
@@ -299,7 +296,7 @@ def _chosen(name: str, values: Sequence[Any] | None, envs: list[int], num_envs: 
     """The values of these trucks."""
     if values is None:
         return None
-    if not hasattr(values, "__len__"):
+    if not isinstance(values, Sequence | np.ndarray) or getattr(values, "ndim", 1) == 0:
         raise TypeError(f"options[{name!r}]: {values!r}; a sequence is needed, one a truck")
     if isinstance(values, str) or len(values) != num_envs:
         n = 1 if isinstance(values, str) else len(values)

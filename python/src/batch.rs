@@ -224,7 +224,8 @@ impl Batch {
             let shape = format!("float32 of shape ({n_envs}, {n_values})");
             let mut observation: PyReadwriteArray2<f32> =
                 observation.extract().map_err(|_| unfit("observation", &shape))?;
-            if observation.shape() != [n_envs, n_values] {
+            // The slice of an array in Fortran's order would be of its transpose.
+            if observation.shape() != [n_envs, n_values] || !observation.is_c_contiguous() {
                 return Err(unfit("observation", &shape));
             }
             let observation = observation.as_slice_mut().map_err(|_| unfit("observation", &shape))?;
@@ -289,7 +290,7 @@ impl Batch {
             }
             let infos =
                 Infos { names: (!numeric).then_some(&self.names), is_same_step: self.autoreset == Autoreset::SameStep };
-            infos.of_ends(py, &state.ends, &state.episodes, self.n_values()).map(Some)
+            infos.of_ends(py, &state.ends, &state.episodes, &state.held, self.n_values()).map(Some)
         })
     }
 

@@ -98,16 +98,17 @@ pub struct Infos<'a> {
 }
 
 impl Infos<'_> {
-    /// The infos of the episodes that a step ended, whose last observations have `n_values` values; `begun` has the
-    /// episodes that trucks are in after the step.
+    /// The infos of the episodes that a step ended, whose last observations have `n_values` values; `episodes` has those
+    /// that trucks are in after the step, or were in where they wait for the others of their group.
     pub fn of_ends<'py>(
         &self,
         py: Python<'py>,
         ends: &[End],
-        begun: &[Episode],
+        episodes: &[Episode],
+        waiting: &[bool],
         n_values: usize,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let n_envs = begun.len();
+        let n_envs = episodes.len();
         let mut mask = vec![false; n_envs];
         let mut codes = vec![0i64; n_envs];
         let mut successes = vec![false; n_envs];
@@ -116,25 +117,27 @@ impl Infos<'_> {
             codes[*env] = i64::from(*code);
             successes[*env] = *code == Ended::Arrived as u32;
         }
+        let has_begun = PyArray1::from_iter(py, mask.iter().zip(waiting).map(|(&ended, &waits)| ended && !waits));
         let mask = PyArray1::from_vec(py, mask);
         let infos = PyDict::new(py);
-        let put = |infos: &Bound<PyDict>, key: &str, values: Bound<PyAny>| {
+        let put = |infos: &Bound<PyDict>, key: &str, values: Bound<PyAny>, mask: &Bound<PyArray1<bool>>| {
             infos.set_item(key, values)?;
-            infos.set_item(format!("_{key}"), &mask)
+            infos.set_item(format!("_{key}"), mask)
         };
-        put(&infos, "ended", PyArray1::from_vec(py, codes).into_any())?;
-        put(&infos, "is_success", PyArray1::from_vec(py, successes).into_any())?;
+        put(&infos, "ended", PyArray1::from_vec(py, codes).into_any(), &mask)?;
+        put(&infos, "is_success", PyArray1::from_vec(py, successes).into_any(), &mask)?;
         for (key, array) in self.episodes(py, n_envs, ends.iter().map(|end| (end.env, end.episode)))? {
-            put(&infos, key, array)?;
+            put(&infos, key, array, &mask)?;
         }
         if !self.is_same_step {
             return Ok(infos);
         }
         let with_final = PyDict::new(py);
-        put(&with_final, "final_obs", self.last_observations(py, n_envs, ends, n_values)?)?;
-        put(&with_final, "final_info", infos.into_any())?;
-        for (key, array) in self.episodes(py, n_envs, ends.iter().map(|end| (end.env, begun[end.env])))? {
-            put(&with_final, key, array)?;
+        put(&with_final, "final_obs", self.last_observations(py, n_envs, ends, n_values)?, &mask)?;
+        put(&with_final, "final_info", infos.into_any(), &mask)?;
+        let begun = ends.iter().map(|end| end.env).filter(|&env| !waiting[env]);
+        for (key, array) in self.episodes(py, n_envs, begun.map(|env| (env, episodes[env])))? {
+            put(&with_final, key, array, &has_begun)?;
         }
         Ok(with_final)
     }

@@ -11,7 +11,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from offtrack_sim import COLUMNS, OBSERVATION, Batch, Ended, ScenarioError
+from offtrack_sim import COLUMNS, OBSERVATION, Batch, Ended, ScenarioError, make_vec
 
 
 def fnv_1a(data: bytes) -> int:
@@ -316,3 +316,32 @@ def test_a_tally_counts_every_step() -> None:
         tally[ended.name.lower()] for ended in Ended if ended
     )
     assert tally["reward"] == pytest.approx(total, abs=1000 / 512)
+
+
+def test_an_array_in_fortrans_order_is_not_written_into() -> None:
+    batch = Batch("attard2023", 5, seed=1)
+    arrays = np.zeros(5, np.float32), np.zeros(5, np.bool_), np.zeros(5, np.bool_)
+    with pytest.raises(TypeError, match=r"observation: .*float32 of shape \(5, 69\)"):
+        batch.step_into(np.zeros(5, int), np.zeros((5, 69), np.float32, order="F"), *arrays)
+
+
+def test_a_state_in_which_trucks_wait_is_refused_where_none_waits() -> None:
+    waits = Batch("attard2023", 4, seed=3, autoreset="next_step")
+    while not waits.waiting()[0]:
+        waits.step(np.array([0, 4, 4, 4]))
+    with pytest.raises(ValueError, match=r"truck\[0\].held: 1; no truck waits with the autoreset same_step"):
+        Batch("attard2023", 4, autoreset="same_step").restore(waits.state())
+
+
+def test_a_mode_is_named_as_gymnasium_names_it() -> None:
+    assert Batch("attard2023", 1, autoreset="NEXT_STEP").autoreset == "next_step"
+    assert make_vec("attard2023", 1, autoreset_mode="SAME_STEP").batch.autoreset == "same_step"
+
+
+def test_what_no_number_holds_is_refused_by_name() -> None:
+    with pytest.raises(ValueError, match="num_envs"):
+        Batch("attard2023", -(2**70))
+    with pytest.raises(ValueError, match=r"weights\['16m'\]: "):
+        Batch("attard2023", 1, weights={"16m": 10**400})
+    with pytest.raises(TypeError, match="points: "):
+        Batch("attard2023", 1).kerb_distance("16m/N-left-3", [["a", "b"]])

@@ -12,6 +12,7 @@ import pytest
 
 import offtrack_sim
 from offtrack_sim import Batch, export
+from offtrack_sim.parallel import RoundaboutParallel
 
 N = 16
 #: Any numbers: float32 in -1..1.
@@ -184,3 +185,16 @@ def test_a_policy_file_of_commands_is_evaluated_as_the_function_that_it_is(
         offtrack_sim.evaluate(policy, levels)
     with pytest.raises(ValueError, match=f"chooses among 9 actions; {scenario} takes commands"):
         offtrack_sim.evaluate(offtrack_sim.Policy.shipped(), scenario)
+
+
+def test_a_command_is_judged_before_it_is_rounded() -> None:
+    actions = {"kind": "continuous", "speeds_kmh": [0.0, 30.0]}
+    continuous = offtrack_sim.benchmark("traffic2026").changed({"actions": actions})
+    env = RoundaboutParallel(continuous, 2, routes=["20m"])
+    env.reset(seed=1)
+    with pytest.raises(ValueError, match=r"actions\['truck_0'\]\[0\]: 1.00000000001; must lie in -1..1"):
+        env.step({"truck_0": np.array([1.00000000001, 0.0]), "truck_1": np.array([0.0, 0.0])})
+    with pytest.raises(ValueError, match=r"actions\[0, 0\]: 1.000000001; must lie in -1..1"):
+        offtrack_sim.evaluate(
+            lambda seen: np.full((len(seen), 2), 1 + 1e-9), "laden2026-continuous", routes=["16m/N-left-3"], episodes=1
+        )

@@ -59,9 +59,9 @@ def test_a_step_of_a_copied_environment_leaves_the_original_where_it_is(way: Cal
         env.step(np.int64(4))
     before = bytes_of(env.batch)
     twin = way(env)
-    steps = [twin.step(np.int64(8)) for _ in range(60) if not twin._needs_reset]
+    steps = [twin.step(np.int64(8)) for _ in range(60) if not twin.batch.waiting()[0]]
     assert bytes_of(env.batch) == before
-    again = [env.step(np.int64(8)) for _ in range(60) if not env._needs_reset]
+    again = [env.step(np.int64(8)) for _ in range(60) if not env.batch.waiting()[0]]
     assert_same(again, steps)
     # What is drawn next is the same too.
     assert_same(env.reset(), twin.reset())

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import warnings
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -10,7 +12,7 @@ import numpy as np
 import pytest
 
 import offtrack_sim
-from offtrack_sim import Batch, Ended, Policy, benchmark
+from offtrack_sim import Batch, Ended, Policy, benchmark, make_vec
 from offtrack_sim.parallel import RoundaboutParallel
 
 with warnings.catch_warnings():
@@ -143,3 +145,38 @@ def test_a_batch_of_groups_is_of_whole_ones_and_no_evaluation_of_single_trucks()
     batch = Batch(GROUPS, 4)
     with pytest.raises(ValueError, match="not begun as a whole"):
         batch.begin([1])
+
+
+def test_a_copy_goes_on_alone() -> None:
+    env = RoundaboutParallel(n_trucks=2, routes=["20m"])
+    env.reset(seed=1)
+    before = env.batch.columns("truck")["truck"].copy()
+    copied = copy.copy(env)
+    copied.step({agent: 0 for agent in copied.agents})
+    assert (env.batch.columns("truck")["truck"] == before).all()
+    assert (copied.batch.columns("truck")["truck"] != before).any()
+
+
+def test_a_benchmark_is_named_by_a_path_too() -> None:
+    file = Path(__file__).parents[2] / "scenarios" / "traffic2026.toml"
+    assert RoundaboutParallel(file, 2, routes=["20m"]).batch.group == 2
+
+
+@pytest.mark.parametrize("mode", ["same_step", "next_step"])
+def test_infos_of_a_vector_environment_tell_which_trucks_of_a_group_have_begun(mode: str) -> None:
+    env = make_vec(GROUPS, 16, routes=["16m"], autoreset_mode=mode, seed=3)
+    env.reset(seed=3)
+    generator, n_begun = np.random.default_rng(5), 0
+    for _ in range(300):
+        waited, before = env.batch.waiting(), env.batch.columns("truck")["truck"]["episode"].copy()
+        _, _, terminated, truncated, infos = env.step(generator.integers(36, size=16))
+        begun = env.batch.columns("truck")["truck"]["episode"] != before
+        routes = env.batch.routes()
+        ended = terminated | truncated
+        told = infos.get("_route", np.zeros(16, dtype=bool)) & (begun if mode == "next_step" else True)
+        assert (told == begun).all() and not (begun & env.batch.waiting()).any()
+        assert (begun <= (waited if mode == "next_step" else waited | ended)).all()
+        for truck in np.flatnonzero(begun):
+            assert infos["route"][truck] == env.batch.route_names[routes[truck]]
+        n_begun += begun.sum()
+    assert n_begun >= 8

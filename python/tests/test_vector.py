@@ -154,3 +154,28 @@ def test_a_reset_states_routes_and_starts_of_the_marked_trucks_alone() -> None:
     assert infos["route"].tolist() == [None, "50m/W-left-2", None] and infos["_route"].tolist() == mask.tolist()
     assert (after[[0, 2]] == before[[0, 2]]).all() and (after[1] != before[1]).any()
     assert env.batch.columns("progress")["progress"]["lane_distance"][1] < 1e-4
+
+
+def test_a_batch_that_was_put_elsewhere_is_believed() -> None:
+    env = offtrack_sim.make_vec("attard2023", 2, seed=1)
+    env.reset(seed=1)
+    running = env.batch.state()
+    while not env.batch.waiting()[0]:
+        env.step(np.array([0, 4]))
+    env.batch.restore(running)
+    assert env.step(np.array([4, 4]))[4] == {}
+    single = offtrack_sim.Roundabout()
+    single.reset(seed=1)
+    running = single.batch.state()
+    while not single.batch.waiting()[0]:
+        single.step(0)
+    single.batch.restore(running)
+    single.step(4)
+
+
+def test_seeds_and_starts_are_sequences() -> None:
+    env = offtrack_sim.make_vec("attard2023", 2)
+    first = env.reset(seed=np.array(7))[0]  # type: ignore[arg-type]
+    assert (first == env.reset(seed=7)[0]).all()
+    with pytest.raises(TypeError, match="starts"):
+        env.reset(options={"starts": {"a": None, "b": None}})

@@ -35,7 +35,7 @@ pub enum Error {
     /// Trucks of a group begin together.
     #[error(
         "trucks: the group of truck {env} is not begun as a whole; all {group} begin together, each or none on a \
-             stated route"
+             stated route, each or none in a stream of its own"
     )]
     PartOfGroup {
         /// A truck of the group.
@@ -200,6 +200,12 @@ pub enum Error {
         n_envs: usize,
         /// Bytes needed.
         n_bytes: usize,
+    },
+    /// A stored truck that waits for its next episode, where that begins in the same step.
+    #[error("truck[{env}].held: 1; no truck waits with the autoreset same_step: go on with next_step or disabled")]
+    HeldInSameStep {
+        /// Index of the truck.
+        env: usize,
     },
     /// A stored truck that cannot be in this world.
     #[error("{column}[{env}]: {found}; the world has {limit}")]

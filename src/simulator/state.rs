@@ -9,7 +9,7 @@ use glam::Vec2;
 
 use crate::engine::cpu::perceive::pose_of;
 use crate::engine::limits::{self, FAR, FASTEST, MOST, STEEPEST};
-use crate::engine::{Batch, Error};
+use crate::engine::{Autoreset, Batch, Error};
 use crate::layout::{Column, Control, Ended, N_CARS, N_POSES, Pose, Progress, Reward, RewardTerms, Truck};
 use crate::traffic::{Car, Row};
 use crate::world::World;
@@ -28,6 +28,9 @@ pub(super) fn check_state(world: &World, batch: &Batch) -> Result<(), Error> {
         let n_waypoints = world.routes[truck.route as usize].n_waypoints;
         check_control(world, env, &batch.control[env])?;
         check_truck(world, env, truck, progress)?;
+        if truck.held == 1 && batch.autoreset() == Autoreset::SameStep && world.group() == 1 {
+            return Err(Error::HeldInSameStep { env });
+        }
         let clearance = &batch.clearance[env];
         within(Column::Clearance, env, ".tractor", clearance.tractor, -MOST..=MOST)?;
         within(Column::Clearance, env, ".trailer", clearance.trailer, -MOST..=MOST)?;

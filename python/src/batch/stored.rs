@@ -79,7 +79,8 @@ impl Batch {
         let wrong = || PyValueError::new_err("ends: what last_ended gives is needed");
         let (n, n_values) = (envs.len(), self.n_values());
         let values = observations.as_slice().map_err(|_| wrong())?;
-        if [codes.len(), routes.len(), vehicles.len()] != [n; 3] || observations.shape() != [n, n_values] {
+        let fits = observations.shape() == [n, n_values] && observations.is_c_contiguous();
+        if [codes.len(), routes.len(), vehicles.len()] != [n; 3] || !fits {
             return Err(wrong());
         }
         let end = |index: usize| {
