@@ -197,13 +197,21 @@ fn text(file: &Path, output: &Path, map: &Map, choice: &Choice, imported: &Impor
     let Imported { ground, centre, .. } = imported;
     // A name may hold line breaks, which would end the comment.
     let name = file.file_name().map(|name| name.to_string_lossy().escape_debug().to_string()).unwrap_or_default();
-    let (what, flags) = match choice.ways.as_slice() {
+    let (what, mut flags) = match choice.ways.as_slice() {
         [] => ("roundabout", format!(" --ring {:.1},{:.1}", centre.x, centre.y)),
         ways => (
             "junction",
             ways.iter().map(|way| format!(" --way {},{}", way.from, way.to).escape_debug().to_string()).collect(),
         ),
     };
+    match choice.hand {
+        Hand::Map => {}
+        Hand::Right => flags += " --hand right",
+        Hand::Left => flags += " --hand left",
+    }
+    if !choice.arms.is_empty() {
+        let _ = write!(flags, " --arms {}", choice.arms.join(","));
+    }
     let mut comment = vec![
         format!(
             "A {what} of the map {name}: its centre, here the origin, lies at ({:.4}, {:.4}) there.",

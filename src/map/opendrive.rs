@@ -149,8 +149,8 @@ impl Map {
         nearest.ok_or_else(|| {
             let (roads, holes) = (self.n_roads(), self.refused.len());
             let expected = format!(
-                "no roundabout here: {roads} roads around {holes} islands and blocks, none with one-way \
-                         traffic around it"
+                "no roundabout here: {roads} roads around {holes} islands and blocks, none of them a circle \
+                         with one-way traffic around it: `--check` says what each lacks"
             );
             Reader::of(&self.file).invalid("ring", format_args!("({:.1}, {:.1})", p.x, p.y), expected)
         })

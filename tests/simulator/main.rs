@@ -33,6 +33,7 @@ mod map_export;
 mod map_junctions;
 mod map_kinds;
 mod map_lanes;
+mod map_objects;
 mod maps;
 mod modules;
 mod observe;

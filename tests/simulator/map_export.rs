@@ -42,7 +42,11 @@ fn read_back(road: &Road) -> (Map, Ground) {
             .min_by(|one, other| apart(one.bearing, bearing).abs().total_cmp(&apart(other.bearing, bearing).abs()));
         nearest.unwrap().name.clone()
     };
-    let arms: Vec<String> = found.arms.iter().map(|arm| name(arm.bearing)).collect();
+    let mut arms: Vec<String> = found.arms.iter().map(|arm| name(arm.bearing)).collect();
+    // Names go around the map; the first arm lies in the east of either.
+    if map.is_mirrored() {
+        arms[1..].reverse();
+    }
     (
         Map::parse(Path::new("back.xodr"), &text, Hand::Map).unwrap(),
         map.ground(&ring, &Options { arms }).unwrap().ground,

@@ -149,6 +149,15 @@ fn a_left_hand_map_gives_the_roundabout_of_its_mirror_image() {
     let (twin, right) = (left.ground(&ring, &Options::default()).unwrap().ground, self::ring());
     // Arms are named by where they lie in the map: north of the left-hand one is south of its mirror image.
     assert_eq!(twin.arms.iter().map(|arm| arm.name.as_str()).collect::<Vec<_>>(), ["E", "S", "W", "N"]);
+    // Names that are given go around the map as everywhere, counter-clockwise from east.
+    let arms = ["first", "second", "third", "fourth"].map(str::to_owned).to_vec();
+    let given = left.ground(&ring, &Options { arms: arms.clone() }).unwrap().ground;
+    assert_eq!(
+        given.arms.iter().map(|arm| arm.name.as_str()).collect::<Vec<_>>(),
+        ["first", "fourth", "third", "second"]
+    );
+    let few = left.ground(&ring, &Options { arms: arms[..2].to_vec() }).unwrap_err();
+    assert!(few.to_string().contains("the ring has 4 arms, at 3, 93, 183, 273 deg"), "{few}");
     assert_eq!(twin.lines.len(), right.ground().lines.len());
     for (one, other) in twin.lines.iter().zip(&right.ground().lines) {
         assert!(one.line.point_at(30.0).distance(other.line.point_at(30.0)) < 0.01);

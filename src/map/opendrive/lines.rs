@@ -76,7 +76,8 @@ impl Lines<'_> {
         for line in &self.lines {
             if let Some((distance, p)) = closest(&line.line, faces).filter(|(distance, _)| *distance < NEAREST) {
                 let (place, route) = (self.place, self.name(line.entry, line.lane, line.exit));
-                let at = format!("({:.1}, {:.1}) from the centre", p.x, p.y);
+                let y = if self.mirrored { -p.y } else { p.y };
+                let at = format!("({:.1}, {y:.1}) from the centre", p.x);
                 self.warnings.push(format!("{place}: {route}: its centre line is {distance:.2} m from a kerb at {at}"));
             }
         }

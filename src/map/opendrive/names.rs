@@ -1,14 +1,23 @@
 //! Names of arms: those that the user gives, or points of the compass.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use super::crossings::ArmLanes;
 use crate::map::ground::Arm;
 
-/// The arms with their names, or what is wrong with those that are given; none is given where they are to be found.
+/// The arms with their names, or what is wrong with those that are given, in the map's order; none is given where they
+/// are to be found.
 pub(super) fn named(lanes: &[ArmLanes], given: &[String], mirrored: bool) -> Result<Vec<Arm>, String> {
     let bearings: Vec<f64> = lanes.iter().map(|arm| arm.bearing().rem_euclid(TAU)).collect();
+    // In the mirror image of a map its arms follow each other clockwise.
+    let in_map = |bearing: f64| if mirrored { (-bearing).rem_euclid(TAU) } else { bearing };
+    let mut order: Vec<usize> = (0..lanes.len()).collect();
+    let from_east = |&arm: &usize| (in_map(bearings[arm]) + PI / 8.0).rem_euclid(TAU);
+    order.sort_by(|one, other| from_east(one).total_cmp(&from_east(other)));
     let mut names = given.to_vec();
+    if given.len() == lanes.len() {
+        order.iter().zip(given).for_each(|(&arm, name)| names[arm].clone_from(name));
+    }
     if names.is_empty() {
         for bearing in &bearings {
             let bearing = if mirrored { -bearing } else { *bearing };
@@ -23,7 +32,11 @@ pub(super) fn named(lanes: &[ArmLanes], given: &[String], mirrored: bool) -> Res
         return Err(format!(
             "the ring has {} arms, at {} deg",
             lanes.len(),
-            bearings.iter().map(|b| format!("{:.0}", b.to_degrees())).collect::<Vec<_>>().join(", ")
+            order
+                .iter()
+                .map(|&arm| format!("{:.0}", in_map(bearings[arm]).to_degrees() % 359.5))
+                .collect::<Vec<_>>()
+                .join(", ")
         ));
     }
     for (i, name) in names.iter().enumerate() {

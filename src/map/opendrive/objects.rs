@@ -31,40 +31,55 @@ pub(super) fn islands(source: &mut Source, node: Node, road: &RoadRecord) -> Res
         let outlines: Vec<Node> = children(object, "outline")
             .chain(children(object, "outlines").flat_map(|outlines| children(outlines, "outline")))
             .collect();
-        let mut corners = Vec::new();
-        for corner in outlines.first().into_iter().flat_map(|outline| outline.children()).filter(Node::is_element) {
-            match corner.tag_name().name() {
-                "cornerLocal" => {
-                    let local = DVec2::new(
-                        source.number(corner, "u", None, LARGEST)?,
-                        source.number(corner, "v", None, LARGEST)?,
-                    );
-                    corners.push(place + turn.rotate(local));
-                }
-                "cornerRoad" => {
-                    let s = source.number(corner, "s", None, 1e5)?.clamp(0.0, road.length);
-                    corners.push(road.point(s, source.number(corner, "t", None, LARGEST)?));
-                }
-                _ => {}
-            }
+        let mut contours = Vec::new();
+        for outline in outlines {
+            contours.push(corners_of(source, outline, road, |local| place + turn.rotate(local))?);
         }
-        if corners.is_empty() && 0.0 < radius {
-            corners = (0..32)
-                .map(|corner| place + radius * DVec2::from_angle(f64::from(corner) * std::f64::consts::TAU / 32.0))
-                .collect();
-        } else if corners.is_empty() && 0.0 < length && 0.0 < width {
+        contours.retain(|corners| !corners.is_empty());
+        if contours.is_empty() && 0.0 < radius {
+            let corner = |corner| place + radius * DVec2::from_angle(f64::from(corner) * std::f64::consts::TAU / 32.0);
+            contours.push((0..32).map(corner).collect());
+        } else if contours.is_empty() && 0.0 < length && 0.0 < width {
             let half = DVec2::new(length, width) / 2.0;
             let unit = [DVec2::new(-1.0, -1.0), DVec2::new(1.0, -1.0), DVec2::ONE, DVec2::new(-1.0, 1.0)];
-            corners = unit.map(|corner| place + turn.rotate(corner * half)).to_vec();
+            contours.push(unit.map(|corner| place + turn.rotate(corner * half)).to_vec());
         }
-        if (3..=MOST_CORNERS).contains(&corners.len()) {
-            islands.push(Island { corners });
-        } else {
+        if contours.is_empty() || contours.iter().any(|corners| !(3..=MOST_CORNERS).contains(&corners.len())) {
             source.warn(object, "is an island without an outline of 3 to 1000 corners; it is left out");
+        } else {
+            islands.extend(contours.into_iter().map(|corners| Island { corners }));
+        }
+        if child(object, "repeat").is_some() {
+            source.warn(object, "is an island that is repeated along the road; it is read once");
         }
     }
     if 0 < others && child(node, "objects").is_some() {
         source.warn(node, &format!("{others} objects are not read"));
     }
     Ok(islands)
+}
+
+/// The corners of an outline of an object, where `placed` is a point of the object's own frame.
+fn corners_of(
+    source: &mut Source,
+    outline: Node,
+    road: &RoadRecord,
+    placed: impl Fn(DVec2) -> DVec2,
+) -> Result<Vec<DVec2>, Error> {
+    let mut corners = Vec::new();
+    for corner in outline.children().filter(Node::is_element) {
+        match corner.tag_name().name() {
+            "cornerLocal" => {
+                let local =
+                    DVec2::new(source.number(corner, "u", None, LARGEST)?, source.number(corner, "v", None, LARGEST)?);
+                corners.push(placed(local));
+            }
+            "cornerRoad" => {
+                let s = source.number(corner, "s", None, 1e5)?.clamp(0.0, road.length);
+                corners.push(road.point(s, source.number(corner, "t", None, LARGEST)?));
+            }
+            _ => {}
+        }
+    }
+    Ok(corners)
 }

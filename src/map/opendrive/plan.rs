@@ -43,6 +43,11 @@ impl Source<'_, '_> {
             if GAP < gap {
                 self.warn(plan, &format!("its reference line jumps by {gap:.3} m at s {:.2} m", after.start));
             }
+            let over = before.start + before.length - after.start;
+            if GAP < over.abs() {
+                let says = format!("a piece begins at s {:.2} m and has {:.2} m", before.start, before.length);
+                self.warn(plan, &format!("{says}, the next begins at s {:.2} m", after.start));
+            }
         }
         Ok(pieces.into_iter().map(|(piece, _)| piece).collect())
     }

@@ -114,6 +114,11 @@ impl Source<'_, '_> {
             length = measured;
         }
         let link = child(node, "link");
+        let ends = ["predecessor", "successor"].map(|name| link.and_then(|link| child(link, name)));
+        for end in ends.into_iter().flatten().filter(|&end| road_link(end).is_none()) {
+            let what = format!("has the elementType {}", shown(attribute(end, "elementType")));
+            self.warn(end, &format!("{what}; must be road or junction, and is not read"));
+        }
         let end = |name: &'static str| link.and_then(|link| child(link, name)).and_then(road_link);
         let lanes = child(node, "lanes");
         let offsets = match lanes {

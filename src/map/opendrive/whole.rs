@@ -73,11 +73,9 @@ impl Records {
             }
         }
         let warnings = missing.into_iter().take(MOST_WARNINGS).map(|(road, what, id)| {
-            format!(
-                "road {}: is linked to {what} {}, which the file does not have; it is a dead end",
-                shown(road),
-                shown(id)
-            )
+            // Roads between may say themselves what they lead to, and a junction only lists them.
+            let end = if what == "road" { "; it is a dead end" } else { "" };
+            format!("road {}: is linked to {what} {}, which the file does not have{end}", shown(road), shown(id))
         });
         self.warnings.extend(warnings.collect::<Vec<_>>());
     }

@@ -1,0 +1,91 @@
+//! Maps that contradict themselves or say more than is read: what is said of it, and what is left alone.
+
+use crate::map_kinds::{imported, parsed, plain};
+
+/// The ring with a road far from it, 100 m long, that has these objects.
+fn beside(x: f64, objects: &str) -> String {
+    let lane = "<lane id=\"-1\" type=\"driving\"><width sOffset=\"0\" a=\"3.5\" b=\"0\" c=\"0\" d=\"0\"/></lane>";
+    let road = format!(
+        "<road id=\"777\" junction=\"-1\" length=\"100\"><planView><geometry s=\"0\" x=\"{x}\" y=\"-200\" hdg=\"0\" \
+         length=\"100\"><line/></geometry></planView><lanes><laneSection s=\"0\"><center><lane id=\"0\" \
+         type=\"none\"/></center><right>{lane}</right></laneSection></lanes><objects>{objects}</objects></road>"
+    );
+    plain().replace("</OpenDRIVE>", &format!("{road}</OpenDRIVE>"))
+}
+
+const ISLAND: &str = "<object id=\"1\" type=\"trafficIsland\" s=\"50\" t=\"9\" hdg=\"0\"";
+
+#[test]
+fn a_traffic_island_far_from_the_ring_changes_nothing_of_it() {
+    let near = imported(&parsed(&plain()));
+    let with_far = imported(&parsed(&beside(5000.0, &format!("{ISLAND} length=\"4\" width=\"1\"/>"))));
+    let [one, other] = [&near, &with_far].map(|imported| &imported.ground.faces.loops);
+    assert_eq!((one.len(), &near.warnings), (other.len(), &with_far.warnings));
+    for (one, other) in one.iter().zip(other) {
+        assert!((one.length() - other.length()).abs() < 1e-6, "{} {}", one.length(), other.length());
+    }
+}
+
+#[test]
+fn an_island_of_several_outlines_is_read_whole_and_one_that_is_repeated_is_warned_of() {
+    let square = |u: f64| {
+        let corner = |u: f64, v: f64| format!("<cornerLocal u=\"{u}\" v=\"{v}\" z=\"0\"/>");
+        let corners = [corner(u, 0.0), corner(u + 1.0, 0.0), corner(u + 1.0, 1.0), corner(u, 1.0)].concat();
+        format!("<outline>{corners}</outline>")
+    };
+    let text = plain();
+    let arm = text.lines().find(|line| line.contains(" id=\"1\" junction")).unwrap();
+    let on_arm = |objects: &str| {
+        let with = arm.replace("</lanes>", &format!("</lanes><objects>{objects}</objects>"));
+        imported(&parsed(&text.replace(arm, &with))).ground.faces
+    };
+    let island = |outlines: &str| {
+        format!("<object id=\"1\" type=\"trafficIsland\" s=\"20\" t=\"-0.5\"><outlines>{outlines}</outlines></object>")
+    };
+    let (one, other) = (square(0.0), square(6.0));
+    let both = on_arm(&island(&[one.clone(), other.clone()].concat()));
+    assert_eq!(both, on_arm(&[island(&one), island(&other)].concat()));
+    assert_ne!(both, on_arm(&island(&one)));
+    let repeated = format!(
+        "{ISLAND} length=\"4\" width=\"1\"><repeat s=\"10\" length=\"20\" distance=\"5\" tStart=\"0\" tEnd=\"0\"/></object>"
+    );
+    let map = parsed(&beside(5000.0, &repeated));
+    assert!(map.warnings().any(|warning| warning.contains("is repeated along the road; it is read once")));
+}
+
+#[test]
+fn pieces_whose_stations_do_not_follow_each_other_are_warned_of() {
+    let text = plain();
+    let road = text.lines().find(|line| line.contains(" id=\"1\" junction")).unwrap();
+    let cut = |s: &str, length: &str| {
+        let pieces = format!(
+            "length=\"35\"><line/></geometry><geometry s=\"{s}\" x=\"73\" y=\"0\" hdg=\"0\" length=\"{length}\">\
+             <line/></geometry></planView>"
+        );
+        text.replace(road, &road.replace("length=\"70\"><line/></geometry></planView>", &pieces))
+    };
+    let says = "a piece begins at s 0.00 m and has 35.00 m, the next begins at s 3.00 m";
+    assert!(parsed(&cut("3", "67")).warnings().any(|warning| warning.contains(says)));
+    assert!(!parsed(&cut("35", "35")).warnings().any(|warning| warning.contains("a piece begins")));
+}
+
+#[test]
+fn a_link_of_an_unknown_kind_is_warned_of() {
+    let text = plain();
+    let link = "elementType=\"junction\" elementId=\"900\"";
+    assert!(text.contains(link));
+    let map = parsed(&text.replacen(link, "elementId=\"900\"", 1));
+    let says = "must be road or junction, and is not read";
+    assert_eq!(map.warnings().filter(|warning| warning.contains(says)).count(), 1);
+    assert!(!parsed(&text).warnings().any(|warning| warning.contains(says)));
+}
+
+#[test]
+fn a_junction_that_is_not_listed_is_no_dead_end() {
+    let text = plain();
+    let (before, rest) = text.split_once("<junction ").unwrap();
+    let after = rest.split_once("</junction>").unwrap().1;
+    let map = parsed(&format!("{before}{after}"));
+    let missing: Vec<&str> = map.warnings().filter(|warning| warning.contains("is linked to junction")).collect();
+    assert!(!missing.is_empty() && missing.iter().all(|warning| warning.ends_with("which the file does not have")));
+}
