@@ -98,6 +98,9 @@ pub struct Scenario {
     pub fleet: Option<Fleet>,
     /// Lock of the front wheels in place of the vehicle's own (rad).
     pub steer_max: Option<f64>,
+    /// The lock that steer levels are fractions of where it is not that of the first vehicle: part of a benchmark has
+    /// the actions of the whole (rad).
+    pub(crate) lock_of_levels: Option<f64>,
     /// Whether a gutter may be driven on.
     pub gutter: Gutter,
     /// Duration of a step (s).

@@ -119,13 +119,14 @@ impl Simulator {
         batch.downcast_mut()
     }
 
-    /// What each truck draws routes, starts and random actions from, `[n_envs]`.
+    /// What each truck draws from, `[n_envs]`.
     pub fn streams(&self) -> Vec<Stream> {
         self.batch.streams()
     }
 
-    /// Makes trucks draw from other streams from their next episode on, `[n_envs]`: as [`Simulator::restore`] needs it
-    /// where [`Simulator::begin`] had given them.
+    /// Makes trucks draw from other streams from now on, `[n_envs]`: random actions, noise, delays and vehicles at once,
+    /// routes and starts with their next episode. [`Simulator::restore`] needs it where [`Simulator::begin`] had given
+    /// them.
     pub fn set_streams(&mut self, streams: &[Stream]) -> Result<(), Error> {
         let n_envs = self.n_envs();
         if streams.len() != n_envs {

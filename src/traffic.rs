@@ -83,6 +83,8 @@ pub(crate) fn printed_constants() -> String {
 
 /// Time of a step (s).
 pub const STEP: f32 = 0.1;
+/// Largest sum of the fractions of kinds of vehicles: 1, with room for the rounding of decimals.
+pub const WHOLE: f64 = 1.0 + 1e-6;
 
 /// Why a road or a demand suits no traffic.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

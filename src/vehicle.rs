@@ -26,6 +26,8 @@ use crate::layout::{Body, Lag, N_RAYS, N_TRACTOR_RAYS, N_TRAILER_RAYS, Ray, Rig}
 
 /// Acceleration of free fall (m/s^2).
 pub const GRAVITY: f64 = 9.81;
+/// Least fraction of its wheelbase that a tractor with oversteer steers as if it had.
+pub(crate) const WHEELBASE_MIN: f32 = 0.5;
 
 /// A tractor, its trailer, and every load that the trailer may carry. SI units and radians.
 #[derive(Debug, Clone, PartialEq)]

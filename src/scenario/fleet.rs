@@ -153,6 +153,11 @@ impl Scenario {
         drawn.fold(self.vehicle.reach(self.start_heading), |(a, b), (c, d)| (a.max(c), b.max(d)))
     }
 
+    /// The lock that steer levels are fractions of (rad).
+    pub(crate) fn lock_of_levels(&self) -> f64 {
+        self.lock_of_levels.or(self.steer_max).unwrap_or(self.vehicle.tractor.steer_max)
+    }
+
     /// This benchmark for those of its vehicles and loads alone for which `keeps` holds; `None` if there are none.
     pub fn with_classes(&self, keeps: impl Fn(&Class) -> bool) -> Option<Scenario> {
         let mut scenario = self.clone();
@@ -165,6 +170,7 @@ impl Scenario {
         }
         fleet.members.retain(|member| member.loads.values().any(|share| 0.0 < *share));
         let first = fleet.members.first()?;
+        scenario.lock_of_levels = Some(self.lock_of_levels());
         (scenario.vehicle, scenario.load) = (first.vehicle.clone(), first.loads.keys().next()?.clone());
         Some(scenario)
     }

@@ -83,6 +83,7 @@ fn without_routes(
     Ok(Scenario {
         name,
         steer_max: steer_max.map(f64::to_radians),
+        lock_of_levels: None,
         vehicle,
         load,
         fleet,
@@ -180,7 +181,7 @@ fn of_traffic(reader: &Reader, written: &WrittenTraffic) -> Result<Traffic, Erro
         *fraction = reader.within(&format!("traffic.{key}"), *fraction, 0.0..=1.0, "")?;
     }
     let all = vans + large.iter().sum::<f64>();
-    reader.within("traffic.vans and larger vehicles together", all, 0.0..=1.0, "")?;
+    reader.within("traffic.vans and larger vehicles together", all, 0.0..=crate::traffic::WHOLE, "")?;
     let [least, greatest] = traffic::MOST_HINDRANCE;
     let rude = rude.as_ref().map(|written| range(reader, "traffic.rude", written, 1.0, ""));
     Ok(Traffic {

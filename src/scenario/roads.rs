@@ -12,7 +12,7 @@ use crate::files::reader::{Error, Reader, shown};
 use crate::files::shipped::{Kind, Source};
 use crate::map::Road;
 use crate::map::chosen::{Choice, is_map};
-use crate::map::opendrive::Way;
+use crate::map::opendrive::{Hand, Way};
 use crate::map::procedural::Distribution;
 use crate::map::route::Route;
 
@@ -95,6 +95,7 @@ impl Scenario {
         if !is_map(&written.file) {
             let given = [
                 ("ring", written.ring.is_some()),
+                ("hand", written.hand != Hand::Map),
                 ("name", written.name.is_some()),
                 ("arms", !written.arms.is_empty()),
                 ("way", !written.way.is_empty()),

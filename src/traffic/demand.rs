@@ -1,14 +1,14 @@
 //! How many cars want to go where, and which kinds of them.
 
+use super::Error;
 use super::large::N_LARGE;
 use super::network::Network;
 use super::units::probability;
-use super::{Error, STEP};
 
 /// Largest flow of a road without a ring (veh/h).
 pub const MOST_WITHOUT_RING: f64 = 900.0;
 /// Largest flow: at most one car arrives in a step (veh/h).
-pub const MOST: f64 = 3600.0 / STEP as f64;
+pub const MOST: f64 = 36_000.0;
 /// Weight of a U-turn among the exits, where nothing else is said.
 const U_TURN: f64 = 0.1;
 

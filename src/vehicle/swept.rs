@@ -52,6 +52,8 @@ struct Towing {
     trailer_wheelbase: f64,
     /// Length by which slip moves a unit's turning point ahead (m).
     slip: f64,
+    /// Length by which each (m/s)² lengthens the wheelbase as which the tractor steers (s²/m).
+    understeer: f64,
 }
 
 /// Motion of both units at one instant.
@@ -73,12 +75,12 @@ impl Towing {
         let (fifth_wheel, trailer_wheelbase) = (f64::from(rig.fifth_wheel), f64::from(rig.trailer_wheelbase));
         // The same bound as in the simulator's equations, and another that keeps the tractor's lever positive.
         let slip = (f64::from(rig.slip) * speed * speed).min(rig.slip_lever_max.into()).min(0.8 * wheelbase);
-        Towing { speed, wheelbase, fifth_wheel, trailer_wheelbase, slip }
+        Towing { speed, wheelbase, fifth_wheel, trailer_wheelbase, slip, understeer: rig.understeer.into() }
     }
 
     /// Motion where the front axle moves in a direction relative to the tractor, at an articulation (rad).
     fn turning(&self, direction: f64, articulation: f64) -> Turning {
-        let Towing { speed, wheelbase, fifth_wheel, trailer_wheelbase, slip } = *self;
+        let Towing { speed, wheelbase, fifth_wheel, trailer_wheelbase, slip, .. } = *self;
         let along = speed * direction.cos();
         let yaw = speed * direction.sin() / (wheelbase - slip);
         let (sin, cos) = articulation.sin_cos();

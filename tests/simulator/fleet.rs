@@ -157,6 +157,32 @@ fn a_benchmark_states_vehicles_shares_and_ranges() {
 }
 
 #[test]
+fn a_load_alone_has_the_actions_of_the_whole_benchmark() {
+    let folder = tempfile::tempdir().unwrap();
+    let narrow = std::fs::read_to_string(format!("{}/scenarios/vehicles/eu_4x2_13m6.toml", env!("CARGO_MANIFEST_DIR")));
+    let narrow: String = narrow
+        .unwrap()
+        .lines()
+        .map(
+            |line| {
+                if line.starts_with("steer_max_deg") { "steer_max_deg = 20.0\n".into() } else { format!("{line}\n") }
+            },
+        )
+        .collect();
+    let file = folder.path().join("narrow.toml");
+    std::fs::write(&file, narrow).unwrap();
+    let scenario = written(&format!(
+        "[[vehicle]]\nfile = \"daf_xf\"\nloads = {{ empty = 1 }}\n[[vehicle]]\nfile = \"{}\"\nloads = {{ laden = 1 }}",
+        file.display()
+    ));
+    let scenario = scenario.unwrap();
+    let laden = scenario.with_classes(|class| class.load == "laden").unwrap();
+    let [whole, laden] = [&scenario, &laden].map(|scenario| World::bake(scenario).unwrap());
+    assert_eq!(whole.actions, laden.actions);
+    assert!(laden.rigs[0].steer_max < whole.rigs[0].steer_max);
+}
+
+#[test]
 fn what_is_wrong_with_a_fleet_is_named() {
     let member = "[[vehicle]]\nfile = \"daf_xf\"\nloads = { empty = 1 }\n";
     for (lines, expected) in [

@@ -100,3 +100,23 @@ fn a_state_that_no_truck_can_have_is_refused_by_column_truck_field_and_value() {
         }
     }
 }
+
+#[test]
+fn a_truck_that_waits_is_refused_where_the_next_episode_begins_in_the_same_step() {
+    let world = Arc::new(benchmark("attard2023").1);
+    for (name, engine) in engines() {
+        let mut simulator = driven(&world, &engine);
+        simulator.set_autoreset(Autoreset::NextStep);
+        while simulator.batch().truck[0].held == 0 {
+            simulator.step_at_random();
+        }
+        let kept = simulator.batch().clone();
+        simulator.restore(|column| Some(kept.column(column))).unwrap();
+        simulator.set_autoreset(Autoreset::SameStep);
+        let message = simulator.restore(|column| Some(kept.column(column))).unwrap_err().to_string();
+        assert!(
+            message.starts_with("truck[0].held: 1; no truck waits with the autoreset same_step"),
+            "{name}: {message}"
+        );
+    }
+}

@@ -10,6 +10,7 @@ use crate::engine::Row;
 use crate::layout::angle::{sin_cos, wrapped};
 use crate::layout::shared::constants;
 use crate::layout::{Control, Rig, Roll, Truck};
+use crate::vehicle;
 use crate::world::World;
 
 constants! {
@@ -18,7 +19,7 @@ constants! {
     /// Keeps a quotient finite at a standstill (m^2/s^2).
     const SPEED_SQUARED_MIN: f32 = 0.01;
     /// Least fraction of its wheelbase that a tractor with oversteer steers as if it had.
-    const WHEELBASE_MIN: f32 = 0.5;
+    const WHEELBASE_MIN: f32 = vehicle::WHEELBASE_MIN;
 }
 
 /// One step of the truck: its sub-steps, and the largest load transfer ratio of each unit among them.

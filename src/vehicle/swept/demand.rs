@@ -3,7 +3,7 @@
 use super::{Pose, Towing};
 use crate::geometry::Curve;
 use crate::layout::{Rig, Roll};
-use crate::vehicle::GRAVITY;
+use crate::vehicle::{GRAVITY, WHEELBASE_MIN};
 
 /// What the truck does at a pose. All are left positive.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -125,11 +125,14 @@ pub fn steer_angle_max(rig: &Rig, centre_line: &Curve, path: &[Pose], speed: f64
     path.iter().enumerate().map(angle).map(f64::abs).fold(0.0, f64::max)
 }
 
-/// Steer angle with which the front axle moves in this direction relative to the tractor: as the tyres slip, the wheels
-/// are turned further. Beyond 90 deg the truck could only be pushed aside (rad).
+/// Steer angle with which the front axle moves in this direction relative to the tractor: as the tyres slip, and where
+/// the tractor understeers, the wheels are turned further. Beyond 90 deg the truck could only be pushed aside (rad).
 fn steer_angle(towing: &Towing, direction: f64) -> f64 {
     let (sin, cos) = direction.sin_cos();
-    (towing.wheelbase * sin).atan2((towing.wheelbase - towing.slip) * cos)
+    let along = towing.speed * cos;
+    let steered = towing.wheelbase + towing.understeer * along * along;
+    let steered = steered.max(f64::from(WHEELBASE_MIN) * towing.wheelbase);
+    (steered * sin).atan2((towing.wheelbase - towing.slip) * cos)
 }
 
 /// Roll of a unit along the path; it begins at rest.
@@ -203,6 +206,21 @@ mod tests {
             assert!((radius.powi(2) + (5.94 - slip).powi(2) - 625.0).abs() < 1.0, "{radius}");
             assert!((along.hypot(along * (5.94 - slip) / radius) - 8.0).abs() < 0.02, "{along}");
         }
+    }
+
+    #[test]
+    fn a_tractor_that_understeers_needs_the_steer_angle_of_the_simulators_equation() {
+        let mut vehicle = Vehicle::named("daf_xf").unwrap();
+        let angle = |vehicle: &Vehicle| driven(vehicle, "empty", 30.0, 1.0, 8.0).1.last().unwrap().steering;
+        let neutral = angle(&vehicle);
+        vehicle.model.understeer = 0.1;
+        let (rig, demands) = driven(&vehicle, "empty", 30.0, 1.0, 8.0);
+        let last = demands.last().unwrap();
+        let curvature = neutral.tan() / f64::from(rig.wheelbase);
+        let along = (last.lateral_acceleration / curvature).sqrt();
+        let steered = f64::from(rig.wheelbase) + f64::from(rig.understeer) * along * along;
+        assert!(f64::from(rig.wheelbase) + 0.5 < steered, "{steered}");
+        assert!((last.steering.tan() - curvature * steered).abs() < 1e-4, "{last:?}");
     }
 
     #[test]
