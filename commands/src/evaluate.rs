@@ -133,10 +133,14 @@ pub fn run(args: &Args) -> Result<(), Error> {
         });
     }
     let passes = passes(&args.widths, HOLD)?;
-    let read = [("--certified", args.certified.as_deref()), ("--benchmark", Some(Path::new(&args.benchmark)))];
+    let of_run: Vec<PathBuf> =
+        args.run.iter().flat_map(|folder| outputs::OF_RUN.map(|name| folder.join(name))).collect();
+    let mut read = vec![("--certified", args.certified.as_deref()), ("--benchmark", Some(Path::new(&args.benchmark)))];
+    read.extend(of_run.iter().map(|file| ("--run", Some(file.as_path()))));
+    read.extend(args.route.iter().map(|road| ("--route", Some(Path::new(road)))));
     outputs::distinct(
         &[("--json", args.json.as_deref()), ("--actions", args.actions.as_deref()), ("--html", args.html.as_deref())],
-        &[&args.policy.files()[..], &read].concat(),
+        &[&args.policy.files()[..], &read[..]].concat(),
     )?;
     let device = args.device.open()?;
     let split = Split::ALL.into_iter().find(|split| split.name() == args.split).unwrap_or(Split::Test);

@@ -13,7 +13,7 @@ use offtrack_drawing::{rasterised, sheet};
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 
-use crate::roads;
+use crate::{outputs, roads};
 
 /// Roads drawn at most.
 const MOST: u32 = 100_000;
@@ -54,6 +54,9 @@ pub struct Args {
     overwrite: bool,
 }
 
+/// Files of the contact sheet.
+const SHEETS: [&str; 2] = ["contact-sheet.svg", "contact-sheet.png"];
+
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
     if !(1..=MOST).contains(&args.count) {
@@ -76,6 +79,10 @@ pub fn run(args: &Args) -> Result<(), Error> {
             expected: "must end in .svg or .png".into(),
         });
     }
+    let of_sheet = args.output.iter().flat_map(|folder| SHEETS.map(|name| folder.join(name))).collect::<Vec<_>>();
+    let read: Vec<outputs::Named> = of_sheet.iter().map(|file| ("--output", Some(file.as_path()))).collect();
+    let distribution = [("--distribution", Some(Path::new(&args.distribution)))];
+    outputs::distinct(&[("--plot", args.plot.as_deref())], &[&read[..], &distribution].concat())?;
     let distribution = Distribution::find(&args.distribution)?;
     let indices: Vec<u32> = (args.first..end).collect();
     let roads = roads::loading("drawing", |loading| distribution.roads(args.seed, &indices, loading))?;
@@ -150,10 +157,9 @@ fn sheets(
         format!("{} random roads", shown.len())
     };
     let title = format!("{of}: distribution {}, seed {}", distribution.name, args.seed);
-    let names = ["contact-sheet.svg", "contact-sheet.png"];
     let svg = sheet::drawn(&title, &shown)
-        .map_err(|error| Error::write(&folder.join(names[0]))(std::io::Error::other(error)))?;
-    names.into_iter().map(|name| Ok((name.to_owned(), picture(&folder.join(name), &svg)?))).collect()
+        .map_err(|error| Error::write(&folder.join(SHEETS[0]))(std::io::Error::other(error)))?;
+    SHEETS.into_iter().map(|name| Ok((name.to_owned(), picture(&folder.join(name), &svg)?))).collect()
 }
 
 /// A picture in the format that the file's name asks for.

@@ -7,6 +7,9 @@ use offtrack_evaluation::error::Error;
 /// A flag and the file that it names, if it is given.
 pub type Named<'a> = (&'static str, Option<&'a Path>);
 
+/// Files in a training run's folder that commands read.
+pub const OF_RUN: [&str; 3] = ["config.toml", "metrics.csv", "report.json"];
+
 /// An error if two of the files to be written are one, or one of them is a file that is read. The second would replace
 /// the first.
 pub fn distinct(written: &[Named], read: &[Named]) -> Result<(), Error> {
@@ -29,8 +32,12 @@ fn is_same(file: &Path, other: &Path) -> bool {
     replaces && resolved(file).is_some_and(|file| resolved(other) == Some(file))
 }
 
-/// The path without links, as far as there is something.
+/// The path without links, as far as there is something; where a link leads to nothing yet, that.
 fn resolved(file: &Path) -> Option<PathBuf> {
+    let file = match file.read_link() {
+        Ok(to) if !file.exists() => &file.parent().unwrap_or(Path::new("")).join(to),
+        _ => file,
+    };
     let folder = file.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
     file.canonicalize().ok().or_else(|| Some(folder.canonicalize().ok()?.join(file.file_name()?)))
 }

@@ -69,7 +69,9 @@ impl Choice {
 
     /// The files that these flags name, if they are files.
     pub fn files(&self) -> [outputs::Named<'_>; 2] {
-        [("--policy", self.policy.as_ref().map(Path::new)), ("--line", self.line.as_deref())]
+        let name = self.policy.as_deref().filter(|name| !["pursuit", "random", YIELDS, FOLLOWS].contains(name));
+        let file = name.map(|name| rule::under(name).map_or(name, |(_, policy)| policy));
+        [("--policy", file.map(Path::new)), ("--line", self.line.as_deref())]
     }
 
     /// An error unless the policy is the one that the training run in `folder` has left.

@@ -87,7 +87,13 @@ pub fn narrow(scenario: &mut Scenario, flag: &'static str, names: &[String], spl
         let found = match added.iter().position(|(known, _)| known == road) {
             Some(found) => found,
             None => {
-                added.push((road.to_owned(), procedural::find(road)?));
+                let roundabout = procedural::find(road)?;
+                let others = scenario.places.iter().map(|place| &place.roundabout.name);
+                if others.chain(added.iter().map(|(_, other)| &other.name)).any(|other| *other == roundabout.name) {
+                    let expected = format!("another road of the benchmark is {} too: rename one", roundabout.name);
+                    return Err(Error::Setting { name: flag, value: name.clone(), expected });
+                }
+                added.push((road.to_owned(), roundabout));
                 added.len() - 1
             }
         };

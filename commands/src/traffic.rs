@@ -14,13 +14,13 @@ use offtrack::files::reader::shown;
 use offtrack::map::Road;
 use offtrack::map::chosen::is_map;
 use offtrack::map::route::Lane;
-use offtrack::traffic::{Mix, Network, Rules, Survey};
+use offtrack::traffic::{Mix, Network, Rules, Survey, WHOLE};
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 
 use crate::import::PlaceArgs;
 use crate::progress::Bar;
-use crate::roads;
+use crate::{outputs, roads};
 
 /// Steps of a minute.
 const STEPS_A_MINUTE: u32 = 600;
@@ -72,6 +72,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
     if let Some(plot) = &args.plot {
         capacity::check_plot(plot)?;
     }
+    let read: Vec<outputs::Named> = args.roads.iter().map(|road| ("ROAD", Some(Path::new(road)))).collect();
+    outputs::distinct(&[("--json", args.json.as_deref()), ("--plot", args.plot.as_deref())], &read)?;
     let mix = mix(&args.share)?;
     let roads: Vec<Road> = args.roads.iter().map(|name| roads::road(name, &args.place)).collect::<Result<_, _>>()?;
     if !args.roads.iter().any(|name| is_map(Path::new(name))) {
@@ -130,7 +132,11 @@ fn within(name: &'static str, value: u32, least: u32, most: u32) -> Result<(), E
 /// The kinds of cars that the flags ask for.
 fn mix(shares: &[String]) -> Result<Mix, Error> {
     let mut mix = Mix::default();
-    for share in shares {
+    for (index, share) in shares.iter().enumerate() {
+        let kind = |share: &String| share.split('=').next().map(str::to_owned);
+        if shares[..index].iter().any(|other| kind(other) == kind(share)) {
+            return Err(setting("--share", share, "its kind is given twice: leave one out"));
+        }
         let parsed = share.split_once('=').and_then(|(kind, fraction)| Some((kind, fraction.parse::<f32>().ok()?)));
         let fraction = match parsed {
             Some(("vans", fraction)) => Some((&mut mix.vans, fraction)),
@@ -148,8 +154,8 @@ fn mix(shares: &[String]) -> Result<Mix, Error> {
             }
         }
     }
-    let all = mix.vans + mix.large.iter().sum::<f32>();
-    if 1.0 < all {
+    let all = f64::from(mix.vans) + mix.large.iter().copied().map(f64::from).sum::<f64>();
+    if WHOLE < all {
         return Err(setting("--share", &shares.join(" "), "vans, buses and trucks must be at most 1 together"));
     }
     Ok(mix)

@@ -162,7 +162,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     }
     outputs::distinct(
         &[("--json", args.json.as_deref()), ("--plot", args.plot.as_deref())],
-        &[("--config", args.config.as_deref())],
+        &[("--config", args.config.as_deref()), ("--benchmark", Some(Path::new(&args.benchmark)))],
     )?;
     let mut device = args.device.open()?;
     let start = Instant::now();

@@ -49,3 +49,39 @@ fn a_file_to_be_written_that_is_another_of_the_commands_files_is_refused_before_
     let said = refusal(&offtrack(&["trace", &vectors, "-o", &vectors]), 2);
     assert!(said.contains("--output: ") && said.contains("is the file of CASES too"), "{said}");
 }
+
+#[test]
+fn no_output_replaces_what_the_command_reads_under_another_name() {
+    let place = Place::new();
+    let own = place.text("own.toml");
+    std::fs::copy(repository().join("scenarios/roundabouts/16m.toml"), &own).unwrap();
+    let policy = place.text("policy.safetensors");
+    std::fs::write(&policy, "a policy").unwrap();
+    std::fs::create_dir(place.file("run")).unwrap();
+    let report = place.text("run/report.json");
+    std::os::unix::fs::symlink(place.file("seen.json"), place.file("seen.html")).unwrap();
+    let (to, link) = (place.text("seen.json"), place.text("seen.html"));
+    let yields = format!("yields:{policy}");
+    let cases: [(&[&str], &str); 7] = [
+        (&["traffic", &own, "--json", &own], "--json: {}; is the file of ROAD too"),
+        (&["scale", "--benchmark", &own, "--envs", "8", "--json", &own], "--json: {}; is the file of --benchmark too"),
+        (&["evaluate", "--policy", &yields, "--json", &policy], "--json: {}; is the file of --policy too"),
+        (
+            &["evaluate", "--run", &place.text("run"), "--json", &report, "--html", &place.text("page.html")],
+            "--json: {}; is the file of --run too",
+        ),
+        (&["evaluate", "--json", &to, "--html", &link], "--html: {}; is the file of --json too"),
+        (&["evaluate", "--route", &own, "--json", &own], "--json: {}; is the file of --route too"),
+        (
+            &["generate", "--output", &place.text("g"), "--plot", &place.text("g/contact-sheet.svg"), "--count", "2"],
+            "--plot: {}; is the file of --output too",
+        ),
+    ];
+    std::fs::create_dir(place.file("g")).unwrap();
+    for (arguments, expected) in cases {
+        let said = refusal(&offtrack(arguments), 2);
+        let (flag, rest) = expected.split_once("{}").unwrap();
+        assert!(said.contains(flag) && said.contains(rest), "{arguments:?}: {said}");
+    }
+    assert_eq!(std::fs::read_to_string(&policy).unwrap(), "a policy");
+}

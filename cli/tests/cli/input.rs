@@ -1,6 +1,6 @@
 //! Wrong input of every command: exit code 2, and an error with name, value and what would do.
 
-use crate::place::{Place, offtrack, refusal, succeed};
+use crate::place::{Place, offtrack, refusal, repository, succeed};
 
 #[test]
 fn a_wrong_argument_is_reported_with_its_value_and_what_would_do() {
@@ -271,4 +271,30 @@ fn the_help_says_what_happens_without_a_command_and_lists_the_exit_codes() {
             .all(|words| help.contains(words)),
         "{help}"
     );
+}
+
+#[test]
+fn a_road_of_a_name_that_the_benchmark_has_is_refused() {
+    let place = Place::new();
+    let copy = place.text("20m.toml");
+    std::fs::copy(repository().join("scenarios/roundabouts/40m.toml"), &copy).unwrap();
+    for routes in [&["--route", &copy][..], &["--route", "wide/7/12", "--route", "wide/07/12"]] {
+        let said = refusal(&offtrack(&[&["evaluate", "--policy", "random", "--episodes", "1"], routes].concat()), 2);
+        assert!(said.contains("--route: ") && said.contains("another road of the benchmark is"), "{said}");
+    }
+}
+
+#[test]
+fn a_hand_is_for_a_map_alone() {
+    let place = Place::new();
+    let text = std::fs::read_to_string(repository().join("scenarios/attard2023.toml")).unwrap();
+    let (head, roads) = text.split_once("[[roundabout]]").unwrap();
+    let head = head.replace("\"vehicles/", &format!("\"{}/vehicles/", repository().join("scenarios").display()));
+    let changed = format!("{head}[[roundabout]]\nhand = \"left\"{roads}");
+    std::fs::write(place.file("left.toml"), changed).unwrap();
+    let said = refusal(
+        &offtrack(&["evaluate", "--policy", "random", "--episodes", "1", "--benchmark", &place.text("left.toml")]),
+        2,
+    );
+    assert!(said.contains("roundabout[0].hand: given; is for a map"), "{said}");
 }

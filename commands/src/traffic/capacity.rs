@@ -25,6 +25,9 @@ const WIDTH: u32 = 1200;
 /// What was found of an entry lane beside one flow; cars an hour.
 #[derive(Serialize)]
 struct Point {
+    /// Index of its circulating flow among [`FLOWS`].
+    #[serde(skip)]
+    flow: usize,
     road: String,
     arm: String,
     lane: &'static str,
@@ -39,6 +42,7 @@ struct Point {
 struct Case<'a> {
     place: &'a Place,
     survey: &'a Survey<'a>,
+    flow: usize,
     saturated: Saturated,
 }
 
@@ -59,10 +63,10 @@ pub(super) fn run(args: &Args, places: &[Place], mix: Mix) -> Result<(), Error> 
     let mut cases = Vec::new();
     for (place, survey) in places.iter().zip(&surveys) {
         for arm in 0..place.network.n_arms {
-            for circulating in FLOWS {
+            for (flow, circulating) in FLOWS.into_iter().enumerate() {
                 let saturated = survey.saturated(arm, circulating, mix);
                 let saturated = saturated.map_err(|error| setting("ROAD", &place.road.name, &error.to_string()))?;
-                cases.extend(saturated.map(|saturated| Case { place, survey, saturated }));
+                cases.extend(saturated.map(|saturated| Case { place, survey, flow, saturated }));
             }
         }
     }
@@ -104,6 +108,7 @@ impl Case<'_> {
             let [capacity, circulating] =
                 [sum(|counts| counts.served), sum(|counts| counts.circulating)].map(|n| n / hours);
             let point = Point {
+                flow: self.flow,
                 road: self.place.road.name.clone(),
                 arm,
                 lane,
@@ -128,15 +133,12 @@ struct Mean {
     hcm: f64,
 }
 
-/// The kinds of lanes and their means, flow by flow: a lane has as many points as there are flows, in their order.
+/// The kinds of lanes and their means, flow by flow.
 fn means(points: &[(Lane, Point)]) -> BTreeMap<Lane, (&'static str, Vec<Mean>)> {
     let mut kinds: BTreeMap<Lane, (&'static str, Vec<Vec<&Point>>)> = BTreeMap::new();
-    let mut seen: BTreeMap<(&str, &str, &str), usize> = BTreeMap::new();
     for (kind, point) in points {
-        let index = seen.entry((&point.road, &point.arm, point.lane)).or_default();
         let (_, flows) = kinds.entry(*kind).or_insert_with(|| (point.lanes, FLOWS.map(|_| Vec::new()).to_vec()));
-        flows[*index].push(point);
-        *index += 1;
+        flows[point.flow].push(point);
     }
     let mean = |points: Vec<&Point>| {
         let of = |value: fn(&Point) -> f64| points.iter().map(|point| value(point)).sum::<f64>() / points.len() as f64;

@@ -99,13 +99,14 @@ fn found(args: &Args, place: &Place, mix: Mix, bar: &Bar) -> Result<Found, Error
             let level = if capacity < demand { 'F' } else { level_of_service(delay) };
             Manual { lanes: kind.name(place.road.is_mirrored()), capacity, delay, level, queue_95 }
         });
-        let delay = counts.mean_delay();
+        // Speeds of a car alone are rounded, so what nobody hinders may come to less than none.
+        let delay = counts.mean_delay().max(0.0);
         let (level, queue_95) = (level_of_service(delay), counts.queue_95());
         Entry { arm, lane, demand, served, circulating, delay, level, queue_95, hcm }
     };
     let mut all = Counts::default();
     sums.iter().for_each(|counts| all.add(counts));
-    let delay = all.mean_delay();
+    let delay = all.mean_delay().max(0.0);
     Ok(Found {
         road: place.road.name.clone(),
         runs: args.runs,

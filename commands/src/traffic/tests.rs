@@ -74,13 +74,14 @@ fn capacities_fall_with_the_circulating_flow_and_are_plotted_beside_the_manuals(
 #[test]
 fn a_setting_that_no_run_can_have_is_refused_by_flag_and_value() {
     let crossing = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenarios/maps/town03-crossing.outline.toml");
-    let cases: [(&[&str], &str); 6] = [
+    let cases: [(&[&str], &str); 7] = [
         (&["16m", "--minutes", "0"], "--minutes: 0; must lie in 1..1440"),
         (&["16m", "--runs", "2000"], "--runs: 2000; must lie in 1..1000"),
         (&["16m", "--demand", "0"], "--demand: 0; nobody drives"),
         (&["16m", "--capacity", "--plot", "a.pdf"], "--plot: a.pdf; must end in .svg or .png"),
         (&[crossing, "--demand", "1500"], "--demand: 1500; town03-crossing: 1500 veh/h on a road without a ring"),
         (&[crossing, "--capacity"], "--capacity: town03-crossing; has no ring"),
+        (&["16m", "--json", "a.png", "--capacity", "--plot", "a.png"], "--plot: a.png; is the file of --json too"),
     ];
     for (words, expected) in cases {
         let message = run(&args(words)).unwrap_err().to_string();
@@ -96,6 +97,10 @@ fn kinds_of_cars_are_fractions_of_known_kinds() {
     assert_eq!(large, Mix { large: [0.1, 0.2, 0.3], ..Mix::default() });
     let message = of(&["vans=0.6", "buses=0.5"]).unwrap_err().to_string();
     assert_eq!(message, "--share: vans=0.6 buses=0.5; vans, buses and trucks must be at most 1 together");
+    // Decimals that are 1 together, though their binary sum is a little more.
+    assert!(of(&["vans=0.1", "buses=0.2", "rigid_trucks=0.4", "tractor_trailers=0.3"]).is_ok());
+    let message = of(&["rude=0.9", "rude=0.0"]).unwrap_err().to_string();
+    assert_eq!(message, "--share: rude=0.0; its kind is given twice: leave one out");
     for wrong in ["vans", "vans=", "vans=1.5", "vans=-0.1", "vans=NaN", "trams=0.1"] {
         let message = of(&[wrong]).unwrap_err().to_string();
         assert_eq!(
@@ -114,4 +119,14 @@ fn columns_are_as_wide_as_their_widest_cell() {
         vec!["E".to_owned(), "x".to_owned(), "200".to_owned()],
     ];
     assert_eq!(table(&rows), "N  left    1\nE  x     200\n");
+}
+
+#[test]
+fn two_roads_of_one_name_are_measured_as_two() {
+    let words = ["16m", "16m", "--capacity", "--runs", "1", "--minutes", "1"];
+    let points = json(&words);
+    assert_eq!(
+        points.as_array().unwrap().len(),
+        2 * json(&[&words[..1], &words[2..]].concat()).as_array().unwrap().len()
+    );
 }

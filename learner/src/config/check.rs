@@ -77,9 +77,18 @@ impl Config {
         Ok(())
     }
 
-    /// An error if a budget of steps ends before the first update: nothing would be learned. `origin` is the file or
-    /// the flag that gives it.
+    /// An error if a budget of steps ends before the first update, where nothing would be learned, or if an iteration of
+    /// the refinement takes more. `origin` is the file or the flag that gives it.
     pub fn check_budget(&self, origin: &Path) -> Result<(), Error> {
+        if let (Some(refinement), Some(steps)) = (&self.refinement, self.steps)
+            && steps < (self.n_envs * refinement.n_steps) as u64
+        {
+            let expected = format!(
+                "must be at least n_envs = {} times refinement.n_steps = {}, an iteration of the refinement",
+                self.n_envs, refinement.n_steps
+            );
+            return Err(Reader::of(origin).invalid("steps", steps, expected).into());
+        }
         let (warmup, n_steps) = (self.replay_buffer.warmup, self.learning.n_steps + 1);
         let before_updates = (warmup as u64).max(n_steps as u64 * self.n_envs as u64);
         let Some(steps) = self.steps.filter(|&steps| steps <= before_updates) else { return Ok(()) };

@@ -2,6 +2,7 @@
 
 use toml::{Table, Value};
 
+use crate::config::Config;
 use crate::error::Error;
 
 /// What a training file says of other benchmarks: no key of it holds for another one.
@@ -31,8 +32,7 @@ fn one(table: &mut Table, setting: &str) -> Result<(), Error> {
         return Err(wrong("a key is needed before the `=`, its parts joined by single points".into()));
     }
     if value.trim().is_empty() {
-        remove(table, key.trim());
-        return Ok(());
+        return if remove(table, key.trim()) { Ok(()) } else { check_known(&path).map_err(wrong) };
     }
     let mut table = table;
     for part in tables {
@@ -41,6 +41,20 @@ fn one(table: &mut Table, setting: &str) -> Result<(), Error> {
     }
     table.insert((*last).to_owned(), parsed(value.trim()));
     Ok(())
+}
+
+/// What is wrong with a key that no training file has: one alone is read as a file, which stops at it.
+fn check_known(path: &[&str]) -> Result<(), String> {
+    let mut value = Value::Boolean(true);
+    for part in path.iter().rev() {
+        value = Value::Table(Table::from_iter([((*part).to_owned(), value)]));
+    }
+    match value.try_into::<Config>() {
+        Err(error) if error.message().starts_with("unknown field") => {
+            Err(format!("{}; no training file has it", error.message()))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Takes a key out, `replay_buffer.priority`; false where there is none.

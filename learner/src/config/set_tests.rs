@@ -71,3 +71,16 @@ fn a_key_set_wrongly_is_refused_with_what_would_do() {
         assert!(message.contains(expected), "{setting}: {message}");
     }
 }
+
+#[test]
+fn a_key_that_no_training_file_has_cannot_be_taken_out() {
+    for (setting, expected) in [
+        ("lerning.gamma=", "--set: lerning.gamma=; unknown field `lerning`"),
+        ("learning.gama=", "--set: learning.gama=; unknown field `gama`"),
+    ] {
+        let message = with_set(&[setting]).unwrap_err();
+        assert!(message.starts_with(expected) && message.contains("learning"), "{message}");
+    }
+    // Known ones may be absent.
+    with_set(&["validation.benchmark=", "level_replay=", "refinement.begin="]).unwrap();
+}

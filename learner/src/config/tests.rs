@@ -303,6 +303,22 @@ fn a_budget_that_ends_before_the_first_update_is_refused() {
 }
 
 #[test]
+fn a_budget_below_an_iteration_of_the_refinement_is_refused() {
+    let mut config = Config::read(Path::new("lane")).unwrap();
+    let refinement = config.refinement.as_mut().unwrap();
+    refinement.n_steps = 10_000;
+    let iteration = config.n_envs as u64 * 10_000;
+    for (steps, holds) in [(iteration - 1, false), (iteration, true)] {
+        config.steps = Some(steps);
+        let checked = config.check_budget(Path::new("own.toml")).map_err(|error| error.to_string());
+        assert_eq!(checked.is_ok(), holds);
+        if let Err(message) = checked {
+            assert!(message.contains(&format!("own.toml: steps: {steps}; must be at least n_envs = ")), "{message}");
+        }
+    }
+}
+
+#[test]
 fn further_evaluations_are_benchmarks_with_or_without_a_split() {
     let with_also = |list: &str| with("also_evaluate", &format!("also_evaluate = {list}"));
     let config =
