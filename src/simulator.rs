@@ -124,9 +124,9 @@ impl Simulator {
         self.batch.streams()
     }
 
-    /// Makes trucks draw from other streams from now on, `[n_envs]`: random actions, noise, delays and vehicles at once,
-    /// routes and starts with their next episode. [`Simulator::restore`] needs it where [`Simulator::begin`] had given
-    /// them.
+    /// Makes trucks draw from other streams from now on, `[n_envs]`: random actions, noise, delays and vehicles at
+    /// once, routes and starts with their next episode. [`Simulator::restore`] needs it where [`Simulator::begin`] had
+    /// given them.
     pub fn set_streams(&mut self, streams: &[Stream]) -> Result<(), Error> {
         let n_envs = self.n_envs();
         if streams.len() != n_envs {
@@ -234,8 +234,9 @@ impl Simulator {
     /// routes every later step is the same bit for bit.
     ///
     /// Fails where a column is missing or of another size, and for the first value that no truck of this world can
-    /// have: an index or a code outside its table, a number outside its range or none, by column, truck and field. The
-    /// batch is then as it was, so what a file holds can be given unchecked.
+    /// have: an index or a code outside its table, a number outside its range or none, by column, truck and field; and
+    /// for a truck that waits for its next episode where [`Autoreset::SameStep`] leaves none waiting. The batch is then
+    /// as it was, so what a file holds can be given unchecked.
     pub fn restore<'a>(&mut self, bytes_of: impl Fn(Column) -> Option<&'a [u8]>) -> Result<(), Error> {
         let mut batch = self.batch().blank()?;
         let n_envs = batch.n_envs();

@@ -39,7 +39,7 @@ pub use arrivals::{Backlog, Event, arrive};
 pub use car::Car;
 pub use clock::Clock;
 pub use decide::Driver;
-pub use demand::{Demand, Mix};
+pub use demand::{Demand, Mix, together};
 pub use drivers::Drivers;
 pub use large::{Large, LargeTables};
 pub use network::{Kind, Network, Pair, Path, SPACING, Sample, Source, Stretch, Zone};
@@ -83,8 +83,6 @@ pub(crate) fn printed_constants() -> String {
 
 /// Time of a step (s).
 pub const STEP: f32 = 0.1;
-/// Largest sum of the fractions of kinds of vehicles: 1, with room for the rounding of decimals.
-pub const WHOLE: f64 = 1.0 + 1e-6;
 
 /// Why a road or a demand suits no traffic.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -62,12 +62,8 @@ pub fn run(args: &Args) -> Result<bool, Error> {
     }
     // All of them, before the first is driven.
     let entries: Vec<Entry> = args.entries.iter().map(|file| Entry::read(file)).collect::<Result<_, _>>()?;
-    let named = |(file, entry): (&PathBuf, &Entry)| {
-        let named = [entry.policy.as_ref().map(PathBuf::from), entry.actions.clone()];
-        let folder = file.parent().unwrap_or(Path::new("")).to_owned();
-        named.into_iter().flatten().map(move |name| folder.join(name))
-    };
-    let files: Vec<PathBuf> = args.entries.iter().zip(&entries).flat_map(named).collect();
+    let driving = args.entries.iter().zip(&entries).filter_map(|(file, entry)| entry.driving_file(file));
+    let files: Vec<PathBuf> = driving.collect();
     let read: Vec<outputs::Named> = files.iter().map(|file| ("ENTRY", Some(file.as_path()))).collect();
     outputs::distinct(&written, &read)?;
     let mut rows = Vec::new();

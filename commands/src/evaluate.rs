@@ -133,8 +133,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
         });
     }
     let passes = passes(&args.widths, HOLD)?;
-    let of_run: Vec<PathBuf> =
-        args.run.iter().flat_map(|folder| outputs::OF_RUN.map(|name| folder.join(name))).collect();
+    let of_run: Vec<PathBuf> = args.run.iter().flat_map(|folder| outputs::of_run(folder)).collect();
     let mut read = vec![("--certified", args.certified.as_deref()), ("--benchmark", Some(Path::new(&args.benchmark)))];
     read.extend(of_run.iter().map(|file| ("--run", Some(file.as_path()))));
     read.extend(args.route.iter().map(|road| ("--route", Some(Path::new(road)))));

@@ -77,7 +77,7 @@ impl PlaceArgs {
         let given = [
             ("--ring", self.ring.map(|p| format!("{},{}", p.x, p.y))),
             ("--way", self.ways.first().map(|way| format!("{},{}", way.from, way.to))),
-            ("--hand", (self.hand != Hand::Map).then(|| format!("{:?}", self.hand).to_lowercase())),
+            ("--hand", word(self.hand).map(str::to_owned)),
         ];
         let Some((flag, Some(value))) = given.into_iter().find(|(_, value)| value.is_some()) else { return Ok(()) };
         Err(Error::Setting {
@@ -93,6 +93,15 @@ fn hand(word: String) -> Hand {
         "left" => Hand::Left,
         "right" => Hand::Right,
         _ => Hand::Map,
+    }
+}
+
+/// The flag's word for a hand; none where the map decides.
+fn word(hand: Hand) -> Option<&'static str> {
+    match hand {
+        Hand::Map => None,
+        Hand::Right => Some("right"),
+        Hand::Left => Some("left"),
     }
 }
 
@@ -204,10 +213,8 @@ fn text(file: &Path, output: &Path, map: &Map, choice: &Choice, imported: &Impor
             ways.iter().map(|way| format!(" --way {},{}", way.from, way.to).escape_debug().to_string()).collect(),
         ),
     };
-    match choice.hand {
-        Hand::Map => {}
-        Hand::Right => flags += " --hand right",
-        Hand::Left => flags += " --hand left",
+    if let Some(hand) = word(choice.hand) {
+        let _ = write!(flags, " --hand {hand}");
     }
     if !choice.arms.is_empty() {
         let _ = write!(flags, " --arms {}", choice.arms.join(","));

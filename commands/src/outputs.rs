@@ -7,8 +7,10 @@ use offtrack_evaluation::error::Error;
 /// A flag and the file that it names, if it is given.
 pub type Named<'a> = (&'static str, Option<&'a Path>);
 
-/// Files in a training run's folder that commands read.
-pub const OF_RUN: [&str; 3] = ["config.toml", "metrics.csv", "report.json"];
+/// Files that commands read in the folder of a training run.
+pub fn of_run(folder: &Path) -> [PathBuf; 3] {
+    ["config.toml", "metrics.csv", "report.json"].map(|name| folder.join(name))
+}
 
 /// An error if two of the files to be written are one, or one of them is a file that is read. The second would replace
 /// the first.

@@ -16,6 +16,9 @@ use offtrack_evaluation::policies::{self, Controller, LOOK_AHEAD, PurePursuit};
 
 use crate::outputs;
 
+/// Names of what drives without a file.
+const WITHOUT_FILE: [&str; 4] = ["pursuit", "random", YIELDS, FOLLOWS];
+
 /// Which policy drives.
 #[derive(Debug, Clone, Default, clap::Args)]
 // A group of flags is named after its type, and a command may not have two of the same name.
@@ -69,7 +72,7 @@ impl Choice {
 
     /// The files that these flags name, if they are files.
     pub fn files(&self) -> [outputs::Named<'_>; 2] {
-        let name = self.policy.as_deref().filter(|name| !["pursuit", "random", YIELDS, FOLLOWS].contains(name));
+        let name = self.policy.as_deref().filter(|name| !WITHOUT_FILE.contains(name));
         let file = name.map(|name| rule::under(name).map_or(name, |(_, policy)| policy));
         [("--policy", file.map(Path::new)), ("--line", self.line.as_deref())]
     }
@@ -78,8 +81,7 @@ impl Choice {
     pub fn check_is_of(&self, folder: &Path, scenario: &Scenario, world: &World) -> Result<(), Error> {
         let of_run = folder.join("policy.safetensors");
         let learned = match self.policy.as_deref() {
-            Some("pursuit" | "random" | YIELDS | FOLLOWS) => None,
-            Some(name) if rule::under(name).is_some() => None,
+            Some(name) if WITHOUT_FILE.contains(&name) || rule::under(name).is_some() => None,
             Some(name) => Some(policies::learned(name)?),
             None => Some(offtrack_policy::Policy::shipped_for(&scenario.name, world)?),
         };

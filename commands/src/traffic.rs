@@ -14,7 +14,7 @@ use offtrack::files::reader::shown;
 use offtrack::map::Road;
 use offtrack::map::chosen::is_map;
 use offtrack::map::route::Lane;
-use offtrack::traffic::{Mix, Network, Rules, Survey, WHOLE};
+use offtrack::traffic::{Mix, Network, Rules, Survey, together};
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 
@@ -133,8 +133,7 @@ fn within(name: &'static str, value: u32, least: u32, most: u32) -> Result<(), E
 fn mix(shares: &[String]) -> Result<Mix, Error> {
     let mut mix = Mix::default();
     for (index, share) in shares.iter().enumerate() {
-        let kind = |share: &String| share.split('=').next().map(str::to_owned);
-        if shares[..index].iter().any(|other| kind(other) == kind(share)) {
+        if shares[..index].iter().any(|other| other.split('=').next() == share.split('=').next()) {
             return Err(setting("--share", share, "its kind is given twice: leave one out"));
         }
         let parsed = share.split_once('=').and_then(|(kind, fraction)| Some((kind, fraction.parse::<f32>().ok()?)));
@@ -154,8 +153,7 @@ fn mix(shares: &[String]) -> Result<Mix, Error> {
             }
         }
     }
-    let all = f64::from(mix.vans) + mix.large.iter().copied().map(f64::from).sum::<f64>();
-    if WHOLE < all {
+    if 1.0 < together(mix.vans.into(), mix.large.map(f64::from)) {
         return Err(setting("--share", &shares.join(" "), "vans, buses and trucks must be at most 1 together"));
     }
     Ok(mix)

@@ -71,7 +71,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let of_run = files_of("--run", &of_run.collect::<Vec<_>>());
     let mut read = [files_of("--benchmark", &benchmarks), files_of("--policy", &args.policy), of_run].concat();
     read.push(("--baker", args.baker.clone()));
-    read.extend(args.run.iter().flat_map(|folder| outputs::OF_RUN.map(|name| ("--run", Some(folder.join(name))))));
+    read.extend(args.run.iter().flat_map(|folder| outputs::of_run(folder)).map(|file| ("--run", Some(file))));
     let read: Vec<outputs::Named> = read.iter().map(|(flag, file)| (*flag, file.as_deref())).collect();
     outputs::distinct(&[("--output", Some(&args.output))], &read)?;
     if let (true, [_, _, ..]) = (args.world, benchmarks.as_slice()) {

@@ -373,8 +373,8 @@ class Batch(_offtrack.Batch):
         Raises:
             TypeError: For anything but a mapping of names to arrays.
             ValueError: For a state of another batch, and for the first value that no truck of this batch can have, by
-                column, truck and field: a steer angle beyond the lock, a number that is not finite. The batch is left
-                as it was.
+                column, truck and field: a steer angle beyond the lock, a number that is not finite, a truck that waits
+                where ``autoreset`` is ``"same_step"``. The batch is left as it was.
         """
         columns, streams = checked_state(state, self.num_envs)
         self.restore_bytes(columns, streams)

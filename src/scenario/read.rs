@@ -11,6 +11,7 @@ use crate::files::cache::Loading;
 use crate::files::reader::{Error, Reader};
 use crate::files::shipped::Source;
 use crate::layout::MOST_IN_GROUP;
+use crate::traffic::together;
 use crate::vehicle::Vehicle;
 
 impl Scenario {
@@ -180,8 +181,7 @@ fn of_traffic(reader: &Reader, written: &WrittenTraffic) -> Result<Traffic, Erro
     for (key, fraction) in traffic::LARGE_KEYS.into_iter().zip(&mut large) {
         *fraction = reader.within(&format!("traffic.{key}"), *fraction, 0.0..=1.0, "")?;
     }
-    let all = vans + large.iter().sum::<f64>();
-    reader.within("traffic.vans and larger vehicles together", all, 0.0..=crate::traffic::WHOLE, "")?;
+    reader.within("traffic.vans and larger vehicles together", together(vans, large), 0.0..=1.0, "")?;
     let [least, greatest] = traffic::MOST_HINDRANCE;
     let rude = rude.as_ref().map(|written| range(reader, "traffic.rude", written, 1.0, ""));
     Ok(Traffic {

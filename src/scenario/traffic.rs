@@ -2,7 +2,7 @@
 
 use super::check::{Invalid, list, within};
 use crate::layout::MOST_IN_GROUP;
-use crate::traffic::{Drivers, WHOLE};
+use crate::traffic::{Drivers, together};
 
 /// Largest demand (veh/h).
 pub(super) const MOST_DEMAND: f64 = 3000.0;
@@ -47,7 +47,7 @@ impl Traffic {
         for (key, value) in shares.chain(drivers) {
             within(&format!("traffic.{key}"), value, [0.0, 1.0])?;
         }
-        within("traffic.vans and larger vehicles together", self.vans + self.large.iter().sum::<f64>(), [0.0, WHOLE])?;
+        within("traffic.vans and larger vehicles together", together(self.vans, self.large), [0.0, 1.0])?;
         within("traffic.rude[1]", greatest, [least, 1.0])?;
         within("traffic.waiting", self.waiting, [0.0, 1e6])?;
         within("traffic.hindrance", self.hindrance, MOST_HINDRANCE)?;

@@ -12,6 +12,11 @@ pub const MOST: f64 = 36_000.0;
 /// Weight of a U-turn among the exits, where nothing else is said.
 const U_TURN: f64 = 0.1;
 
+/// The sum of fractions of vans and of large vehicles, without what decimals lose in binary.
+pub fn together(vans: f64, large: [f64; N_LARGE]) -> f64 {
+    ((vans + large.iter().sum::<f64>()) * 1e6).round() / 1e6
+}
+
 /// The kinds of cars, by their fractions.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Mix {

@@ -47,7 +47,8 @@ fn an_island_of_several_outlines_is_read_whole_and_one_that_is_repeated_is_warne
     assert_eq!(both, on_arm(&[island(&one), island(&other)].concat()));
     assert_ne!(both, on_arm(&island(&one)));
     let repeated = format!(
-        "{ISLAND} length=\"4\" width=\"1\"><repeat s=\"10\" length=\"20\" distance=\"5\" tStart=\"0\" tEnd=\"0\"/></object>"
+        "{ISLAND} length=\"4\" width=\"1\"><repeat s=\"10\" length=\"20\" distance=\"5\" tStart=\"0\" tEnd=\"0\"/>\
+         </object>"
     );
     let map = parsed(&beside(5000.0, &repeated));
     assert!(map.warnings().any(|warning| warning.contains("is repeated along the road; it is read once")));

@@ -77,8 +77,8 @@ impl Config {
         Ok(())
     }
 
-    /// An error if a budget of steps ends before the first update, where nothing would be learned, or if an iteration of
-    /// the refinement takes more. `origin` is the file or the flag that gives it.
+    /// An error if a budget of steps ends before the first update, so that nothing is learned, or within an iteration
+    /// of the refinement. `origin` is the file or the flag that gives it.
     pub fn check_budget(&self, origin: &Path) -> Result<(), Error> {
         if let (Some(refinement), Some(steps)) = (&self.refinement, self.steps)
             && steps < (self.n_envs * refinement.n_steps) as u64

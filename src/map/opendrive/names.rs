@@ -19,9 +19,8 @@ pub(super) fn named(lanes: &[ArmLanes], given: &[String], mirrored: bool) -> Res
         order.iter().zip(given).for_each(|(&arm, name)| names[arm].clone_from(name));
     }
     if names.is_empty() {
-        for bearing in &bearings {
-            let bearing = if mirrored { -bearing } else { *bearing };
-            let point = (bearing / TAU * 8.0).round().rem_euclid(8.0) as usize % 8;
+        for &bearing in &bearings {
+            let point = (in_map(bearing) / TAU * 8.0).round() as usize % 8;
             let name = ["E", "NE", "N", "NW", "W", "SW", "S", "SE"][point];
             let same =
                 names.iter().filter(|other| other.trim_end_matches(|c: char| c.is_ascii_digit()) == name).count();
@@ -34,7 +33,7 @@ pub(super) fn named(lanes: &[ArmLanes], given: &[String], mirrored: bool) -> Res
             lanes.len(),
             order
                 .iter()
-                .map(|&arm| format!("{:.0}", in_map(bearings[arm]).to_degrees() % 359.5))
+                .map(|&arm| (in_map(bearings[arm]).to_degrees().round() % 360.0).to_string())
                 .collect::<Vec<_>>()
                 .join(", ")
         ));

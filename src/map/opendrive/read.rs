@@ -115,11 +115,7 @@ impl Source<'_, '_> {
         }
         let link = child(node, "link");
         let ends = ["predecessor", "successor"].map(|name| link.and_then(|link| child(link, name)));
-        for end in ends.into_iter().flatten().filter(|&end| road_link(end).is_none()) {
-            let what = format!("has the elementType {}", shown(attribute(end, "elementType")));
-            self.warn(end, &format!("{what}; must be road or junction, and is not read"));
-        }
-        let end = |name: &'static str| link.and_then(|link| child(link, name)).and_then(road_link);
+        let [predecessor, successor] = ends.map(|end| end.and_then(|end| self.road_link(end)));
         let lanes = child(node, "lanes");
         let offsets = match lanes {
             Some(lanes) => self.cubics(children(lanes, "laneOffset"), "s")?,
@@ -132,8 +128,8 @@ impl Source<'_, '_> {
             id,
             length,
             junction,
-            predecessor: end("predecessor"),
-            successor: end("successor"),
+            predecessor,
+            successor,
             plan,
             offsets,
             sections,
@@ -182,13 +178,18 @@ impl Source<'_, '_> {
         }
         rules.len() < 2 * left
     }
-}
 
-fn road_link(node: Node) -> Option<Link> {
-    let id = attribute(node, "elementId").to_owned();
-    match attribute(node, "elementType") {
-        "road" => Some(Link::RoadRecord(id, attribute(node, "contactPoint") != "end")),
-        "junction" => Some(Link::Junction(id)),
-        _ => None,
+    /// What an end of a road is linked to; one of another kind is warned of.
+    fn road_link(&mut self, node: Node) -> Option<Link> {
+        let id = attribute(node, "elementId").to_owned();
+        match attribute(node, "elementType") {
+            "road" => Some(Link::RoadRecord(id, attribute(node, "contactPoint") != "end")),
+            "junction" => Some(Link::Junction(id)),
+            other => {
+                let other = shown(other);
+                self.warn(node, &format!("has the elementType {other}; must be road or junction, and is not read"));
+                None
+            }
+        }
     }
 }
