@@ -39,13 +39,15 @@ const LONGEST: f64 = 508.0;
 
 /// Where paths a and b meet, in metres.
 #[derive(Clone)]
-struct Meeting {
-    a: [f64; 2],
-    b: [f64; 2],
+pub(super) struct Meeting {
+    pub a: [f64; 2],
+    pub b: [f64; 2],
     delta: f64,
     kind: Kind,
     /// Whether the paths become one rather than cross.
     joins: bool,
+    /// Whether b is a lane of the same arm that runs the other way.
+    pub is_oncoming: bool,
 }
 
 impl Network {
@@ -59,7 +61,9 @@ impl Network {
         let courses = courses(ground);
         check(road, &courses)?;
         let fine: Vec<Points> = courses.iter().map(|course| Points::of(&course.line)).collect();
-        let mut meetings = met(&fine);
+        let mut meetings = met(&fine, ground.outer_radius);
+        // Nobody waits for those who come the other way beside a lane of an arm.
+        meetings.iter_mut().for_each(|of_pair| of_pair.retain(|meeting| !meeting.is_oncoming));
         let (lines, clears) = lines(&courses, &meetings);
         add_beside(&courses, &fine, &lines, &mut meetings);
         let sources = sources(&courses);
@@ -91,17 +95,22 @@ fn check(road: &Road, courses: &[Course]) -> Result<(), Error> {
 
 /// The zones of every ordered pair in which both paths cannot be occupied. Those of (b, a) are those of (a, b) with the
 /// paths exchanged, so that two cars always agree on who is ahead.
-fn met(fine: &[Points]) -> Vec<Vec<Meeting>> {
+///
+/// Outside the outer radius are the arms, whose lanes of both directions may lie nearer to each other than [`HARD`].
+pub(super) fn met(fine: &[Points], outer_radius: f64) -> Vec<Vec<Meeting>> {
     let n = fine.len();
     let mut meetings = vec![Vec::new(); n * n];
     for a in 0..n {
         for b in a..n {
             let found = parts(&fine[a], &fine[b], HARD, 0..usize::MAX);
             let of = |part: &Part, [a, b]: [usize; 2]| {
-                let angle = fine[a].angle(part.nearest[0], &fine[b], part.nearest[1]);
+                let [at_a, at_b] = part.nearest;
+                let angle = fine[a].angle(at_a, &fine[b], at_b);
                 let joins = angle < PARALLEL || JOINED <= part.n_same;
                 let kind = if joins || angle < SHALLOW { Kind::Follow } else { Kind::Cross };
-                Meeting { a: metres(part.a), b: metres(part.b), delta: part.delta(), kind, joins }
+                let is_oncoming =
+                    outer_radius < fine[a].point(at_a).length() && fine[a].is_opposite(at_a, &fine[b], at_b);
+                Meeting { a: metres(part.a), b: metres(part.b), delta: part.delta(), kind, joins, is_oncoming }
             };
             if a != b {
                 meetings[b * n + a] = found.iter().map(|part| of(&part.transposed(), [b, a])).collect();
@@ -149,7 +158,8 @@ fn add_beside(courses: &[Course], fine: &[Points], lines: &[f64], meetings: &mut
                         Kind::Soft => ([nearest; 2], [at - SOFT_LENGTH, at]),
                         _ => ([lines[a], nearest], [metres(part.b)[0].max(lines[b]), metres(part.b)[1]]),
                     };
-                    (runs_along && is_in_ring).then_some(Meeting { a, b, delta: 0.0, kind, joins: false })
+                    let meeting = Meeting { a, b, delta: 0.0, kind, joins: false, is_oncoming: false };
+                    (runs_along && is_in_ring).then_some(meeting)
                 })
             };
             let soft = (!touches).then(|| beside(Kind::Soft, SOFT, SOFT_REACH));

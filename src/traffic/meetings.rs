@@ -14,6 +14,8 @@ use crate::geometry::{Curve, wrapped};
 pub(super) const FINE: f64 = 0.5;
 /// Points nearer than this are the same place of two lines that run together (m).
 const SAME: f64 = 0.3;
+/// Cosine of the angle above which lines run against each other, as the two carriageways of an arm do.
+const OPPOSITE: f64 = -0.75;
 
 /// Points of a line every [`FINE`], and its headings there.
 pub(super) struct Points {
@@ -48,6 +50,11 @@ impl Points {
     /// Angle between the directions of two lines, each at one of its points (rad).
     pub(super) fn angle(&self, index: usize, other: &Points, other_index: usize) -> f64 {
         wrapped(self.headings[index] - other.headings[other_index]).abs()
+    }
+
+    /// Whether the other line runs the other way there.
+    pub(super) fn is_opposite(&self, index: usize, other: &Points, other_index: usize) -> bool {
+        self.along(index).dot(other.along(other_index)) < OPPOSITE
     }
 
     /// Stretches of the other line within `within` of a point of this one, `most` at most.

@@ -9,7 +9,7 @@ use super::tables::{Band, LargeTables, Trail};
 use super::trail::Driven;
 use super::{Large, N_CLASSES, N_LARGE};
 use crate::map::Road;
-use crate::traffic::bake::{BEFORE_ZONE, ENTRY, SHALLOW, outwards, too_large};
+use crate::traffic::bake::{BEFORE_ZONE, ENTRY, SHALLOW, met as cars_met, outwards, too_large};
 use crate::traffic::meetings::{FINE, Interval, Points, components};
 use crate::traffic::network::{Kind, MOST_ZONES, Network, Pair, RATIO_ONE, SPACING, UNIT, Zone};
 use crate::traffic::paths::courses;
@@ -22,9 +22,7 @@ const OF_CAR: f64 = 1.25;
 const ROOM: f64 = 0.3;
 /// Farthest that two stations are from those that a zone takes for beside each other (m).
 const UNEVEN: f64 = 0.75;
-/// Cosine of the angle above which paths run the other way beside each other, and how much less room is kept there:
-/// lanes of opposite directions lie close together (m).
-const OPPOSITE: f64 = -0.75;
+/// How much less room is kept between lanes of opposite directions, which lie close together (m).
 const LESS_IF_OPPOSITE: f64 = 0.2;
 /// How far before a zone a front corner may be ahead of the front (m).
 const CORNER: f64 = 0.5;
@@ -80,14 +78,21 @@ impl Network {
             };
             met.push(found);
         }
-        // What needs the lanes of those who come the other way does not come.
+        // What needs the lanes of those who come the other way does not come, but where even cars are too near to them.
+        let of_cars = cars_met(&fine, road.ground().outer_radius);
         let mut fits = vec![true; N_CLASSES * n];
         for (classes, met) in met.iter_mut().enumerate() {
+            let [one, other] = [classes / N_CLASSES, classes % N_CLASSES];
             for (pair, zones) in met.iter_mut().enumerate() {
-                let n_zones = zones.len();
-                zones.retain(|zone| !zone.is_opposite || self.has_zone(pair, zone));
-                let [one, other] = [classes / N_CLASSES, classes % N_CLASSES];
-                fits[one * n + pair / n] &= zones.len() == n_zones || one < other;
+                let has = |zone: &Meeting| self.stretches(pair).any(|[a, b]| overlap(zone.a, a) && overlap(zone.b, b));
+                let (kept, oncoming): (Vec<_>, Vec<_>) =
+                    zones.drain(..).partition(|zone| !zone.is_opposite || has(zone));
+                *zones = kept;
+                let are_near = |zone: &Meeting| {
+                    let mut oncoming = of_cars[pair].iter().filter(|of| of.is_oncoming);
+                    oncoming.any(|of| overlap(zone.a, of.a) && overlap(zone.b, of.b))
+                };
+                fits[one * n + pair / n] &= one < other || oncoming.iter().all(are_near);
             }
         }
         let n_zones = met.iter().flatten().map(Vec::len).sum();
@@ -124,15 +129,12 @@ impl Network {
         Ok(self)
     }
 
-    /// Whether cars too have a zone there, of the pair of paths with this index.
-    fn has_zone(&self, pair: usize, zone: &Meeting) -> bool {
+    /// Where cars have zones, of the pair of paths with this index, on both (m).
+    fn stretches(&self, pair: usize) -> impl Iterator<Item = [[f64; 2]; 2]> {
         let Pair { first, n, .. } = self.pairs[pair];
         let of_cars = self.zones[usize::from(first)..][..usize::from(n)].iter().map(Zone::stretch);
-        let meet =
-            |[from, to]: [f64; 2], low: i32, high: i32| from <= metres(high).into() && f64::from(metres(low)) <= to;
-        of_cars
-            .filter(|of| of.kind != Kind::Soft)
-            .any(|of| meet(zone.a, of.a_in, of.a_out) && meet(zone.b, of.b_in, of.b_out))
+        let ends = |low: i32, high: i32| [low, high].map(|s| f64::from(metres(s)));
+        of_cars.filter(|of| of.kind != Kind::Soft).map(move |of| [ends(of.a_in, of.a_out), ends(of.b_in, of.b_out)])
     }
 
     /// The line of a path for a class, and where the lanes are clear that it crosses: the nearer of what cars and what
@@ -155,6 +157,10 @@ impl Network {
             zones.iter().filter(|zone| zone.kind == Kind::Cross && (near..first + ENTRY).contains(&zone.a[0]));
         [nearest, crossed.map(|zone| length(zone.a[1] as f32)).fold(clear, i32::max)]
     }
+}
+
+fn overlap(one: [f64; 2], other: [f64; 2]) -> bool {
+    one[0] <= other[1] && other[0] <= one[1]
 }
 
 /// What a class sweeps of a path.
@@ -203,7 +209,7 @@ fn of_pair(a: &Points, b: &Points, bands: [&[Vec<f64>; 2]; 2]) -> Vec<Meeting> {
         let side = |along: DVec2, to: DVec2| usize::from(along.perp_dot(to) < 0.0);
         let own = bands[0][side(a.along(row), between)][row];
         let all = own + bands[1][side(b.along(index), -between)][index] + ROOM;
-        if is_opposite(a, row, b, index) { all - LESS_IF_OPPOSITE } else { all }
+        if a.is_opposite(row, b, index) { all - LESS_IF_OPPOSITE } else { all }
     };
     let mut found = Vec::new();
     for part in components(a, b, most, within, 0..usize::MAX) {
@@ -216,7 +222,7 @@ fn of_pair(a: &Points, b: &Points, bands: [&[Vec<f64>; 2]; 2]) -> Vec<Meeting> {
                 pieces(piece, &mut found);
             } else {
                 let (ends_a, ends_b) = ends(piece);
-                let is_opposite = is_opposite(a, nearest.row, b, nearest.nearest);
+                let is_opposite = a.is_opposite(nearest.row, b, nearest.nearest);
                 found.push(Meeting { a: ends_a, b: ends_b, delta: 0.0, ratio: 1.0, kind: Kind::Cross, is_opposite });
             }
         }
@@ -245,11 +251,6 @@ fn runs(part: &[Interval], is_along: impl Fn(&Interval) -> bool) -> Vec<&[Interv
     }
     ends.push(part.len());
     ends.windows(2).map(|ends| &part[ends[0]..ends[1]]).collect()
-}
-
-/// Whether the paths run the other way there.
-fn is_opposite(a: &Points, row: usize, b: &Points, index: usize) -> bool {
-    a.along(row).dot(b.along(index)) < OPPOSITE
 }
 
 /// Where a part begins and ends on both paths (m).

@@ -4,6 +4,10 @@ use super::{baked, even, map};
 use crate::layout::Stream;
 use crate::map::Road;
 use crate::map::ground::Ground;
+use crate::map::procedural;
+use crate::traffic::bake::met;
+use crate::traffic::meetings::Points;
+use crate::traffic::paths::courses;
 use crate::traffic::units::{metres, speed};
 use crate::traffic::{Car, Demand, Error, Event, Kind, Mix, Network, Rules, Run, demand, speed_limit};
 
@@ -36,6 +40,32 @@ fn the_zones_of_a_study_ring_a_map_and_a_junction_are_those_that_their_lanes_mak
             _ => {}
         }
     }
+}
+
+#[test]
+fn the_lines_of_every_road_are_at_its_ring_and_not_where_both_lanes_of_an_arm_are_near_each_other() {
+    let mut roads: Vec<Road> = ["sumo22", "town03", "zala8", "zala25"].map(map).to_vec();
+    for (distribution, first) in [("wide", 40), ("wide", 256), ("wide", 290), ("mixed", 200)] {
+        roads.extend((first..first + 12).map(|k| procedural::find(&format!("{distribution}/2026/{k}")).unwrap()));
+    }
+    let mut n_narrow = 0;
+    for road in roads {
+        let network = Network::bake(&road).unwrap();
+        let outer_radius = road.ground().outer_radius;
+        for (index, path) in network.paths.iter().enumerate() {
+            let beyond = f64::from(network.pose(index, path.line()).0.length()) - outer_radius;
+            assert!(
+                (-10.0..10.0).contains(&beyond),
+                "{}: the line of path {index} is {beyond} m from the ring",
+                road.name
+            );
+        }
+        let fine: Vec<Points> = courses(road.ground()).iter().map(|course| Points::of(&course.line)).collect();
+        let met = met(&fine, outer_radius);
+        n_narrow += usize::from(met.iter().flatten().any(|meeting| meeting.is_oncoming));
+    }
+    // Eight random roads and a map, at least, have an arm whose lanes are that near.
+    assert!(9 <= n_narrow, "{n_narrow}");
 }
 
 #[test]
