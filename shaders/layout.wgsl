@@ -347,7 +347,7 @@ const TRACTOR_LENGTH: f32 = 5.864f;
 const LAG_OF_LARGE: i32 = 1280i;
 // The largest acceleration of a large vehicle: 1.3 m/s² (2^-19 m a step²).
 const MOST_OF_LARGE: i32 = 6816i;
-// Its speed in a bend, in sixteenths of a car's.
+// Its speed, in sixteenths of a car's at that place.
 const PACE_OF_LARGE: i32 = 13i;
 // Words before the tables of large vehicles: how many zones there are.
 const LARGE_HEAD: u32 = 1u;
@@ -368,7 +368,7 @@ const ARRIVAL: u32 = 2147483648u;
 // Path and style of a car that enters: 16 times the step and the source are added.
 const ENTERING: u32 = 2684354560u;
 // Kind of the large vehicle that comes next: source, slot and style of the car before it are added.
-const NEXT_LARGE: u32 = 2952790016u;
+const NEXT_KIND: u32 = 2952790016u;
 // Who of two that stand goes first: the period and both slots are added.
 const COIN: u32 = 3221225472u;
 // Whether one lets another in: the period and both slots are added.
@@ -741,8 +741,8 @@ struct Start {
     vehicle: u32,
 }
 
-// The stream of random numbers that a truck draws routes, starts and random actions from: a truck with the stream
-// (seed, env) drives as truck `env` of a batch with that seed.
+// The stream of random numbers that all of a truck's are from: routes, starts, loads, disturbances, vehicles,
+// random actions. A truck with the stream (seed, env) drives as truck `env` of a batch with that seed.
 struct Stream {
     // Seed.
     seed: u32,

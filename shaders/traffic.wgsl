@@ -171,9 +171,6 @@ fn entering(env: u32, network: Network, view: View, demand: u32, source: u32) ->
     var path = first;
     while path + 1u < end && !falls_below(random.x, lanes[shares + path]) { path++; }
     let kinds = shares + network.n_paths;
-    let van = select(0u, VAN, falls_below(random.y, lanes[kinds]));
-    let rude = select(0u, RUDE, falls_below(random.z, lanes[kinds + 1u]));
-    let of_car = (random.y & (VAN - 1u)) | van | rude;
     var before = no_car();
     var slot_before = 0u;
     var rear_before = BEYOND;
@@ -190,8 +187,11 @@ fn entering(env: u32, network: Network, view: View, demand: u32, source: u32) ->
     var drawn = random.y;
     if network.large != 0u && is_there(before) {
         let place = (source * SLOTS + slot_before) << STYLE_BITS;
-        drawn = traffic_words(env, NEXT_LARGE + place + style_of(before)).x;
+        drawn = traffic_words(env, NEXT_KIND + place + style_of(before)).x;
     }
+    let van = select(0u, VAN, falls_below(drawn, lanes[kinds]));
+    let rude = select(0u, RUDE, falls_below(random.z, lanes[kinds + 1u]));
+    let of_car = (random.y & (VAN - 1u)) | van | rude;
     let of_large = of_car | large_that_comes(network, kinds, drawn);
     let style = select(of_car, of_large, fits(network, path, of_large));
     let front = extent(style);

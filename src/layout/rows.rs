@@ -115,8 +115,8 @@ crate::shared! {
         pub vehicle: u32,
     }
 
-    /// The stream of random numbers that a truck draws routes, starts and random actions from: a truck with the stream
-    /// (seed, env) drives as truck `env` of a batch with that seed.
+    /// The stream of random numbers that all of a truck's are from: routes, starts, loads, disturbances, vehicles,
+    /// random actions. A truck with the stream (seed, env) drives as truck `env` of a batch with that seed.
     pub struct Stream {
         /// Seed.
         pub seed: u32,

@@ -107,18 +107,18 @@ pub fn arrive(
 /// The next car of a source, if there is room for it.
 fn entering(setting: Setting, clock: Clock, cars: &[Car], source: usize, others: &impl Others) -> Option<Car> {
     let Setting { network, rules, demand } = setting;
-    let [drawn, kind, driver, _] = clock.entering(source);
+    let [drawn, own, driver, _] = clock.entering(source);
     let paths = network.paths_of(source);
     let last = paths.end - 1;
     let path = paths.clone().find(|&path| falls_below(drawn, demand.shares[path])).unwrap_or(last);
     let is_of_source = |other: &Car| other.is_there() && paths.contains(&other.path());
     let of_source = || cars.iter().enumerate().filter(|(_, other)| is_of_source(other));
-    let car = Car::entering(path, style([kind, driver], demand), 0);
     let before = || of_source().min_by_key(|(_, other)| other.rear());
-    let car = match network.large.as_ref().and_then(|_| before()) {
-        Some((slot, other)) => car.replaced_by(large(clock.next_large(source, slot as u32, other.style()), demand)),
-        None => car.replaced_by(large(kind, demand)),
+    let kind = match network.large.as_ref().and_then(|_| before()) {
+        Some((slot, other)) => clock.next_kind(source, slot as u32, other.style()),
+        None => own,
     };
+    let car = Car::entering(path, style([kind, own, driver], demand), 0).replaced_by(large(kind, demand));
     let car = if network.fits(&car) { car } else { car.replaced_by(0) };
     let beside = cars.iter().filter_map(|other| beside(network, &car, other));
     let ahead = of_source().map(|(_, other)| (other.rear(), other.pace())).chain(beside).chain(others.ahead(&car));

@@ -256,12 +256,11 @@ fn extent(style: u32) -> i32 {
     }
 }
 
-/// A style drawn from random words.
-pub(super) fn style(words: [u32; 2], demand: &Demand) -> u32 {
-    let [kind, driver] = words;
+/// A style drawn from random words: for the kind, for length and temperament, and for whether the driver is rude.
+pub(super) fn style([kind, own, driver]: [u32; 3], demand: &Demand) -> u32 {
     let flag = |word: u32, probability: u32, flag: u32| if falls_below(word, probability) { flag } else { 0 };
-    // Upper bits tell the kind, lower ones length and temperament.
-    (kind & (VAN - 1)) | flag(kind, demand.vans, VAN) | flag(driver, demand.rude, RUDE)
+    // The first and the second may be one word: its upper bits tell the kind, its lower ones length and temperament.
+    (own & (VAN - 1)) | flag(kind, demand.vans, VAN) | flag(driver, demand.rude, RUDE)
 }
 
 /// The code of a large vehicle drawn from a random word; 0 is none.

@@ -9,7 +9,7 @@ constants! {
     /// Path and style of a car that enters: 16 times the step and the source are added.
     const ENTERING: u32 = 0xA000_0000;
     /// Kind of the large vehicle that comes next: source, slot and style of the car before it are added.
-    const NEXT_LARGE: u32 = 0xB000_0000;
+    const NEXT_KIND: u32 = 0xB000_0000;
     /// Who of two that stand goes first: the period and both slots are added.
     const COIN: u32 = 0xC000_0000;
     /// Whether one lets another in: the period and both slots are added.
@@ -56,11 +56,11 @@ impl Clock {
         self.draw(ENTERING.wrapping_add(16 * self.step + source as u32))
     }
 
-    /// Which large vehicle comes next at a source, if one does, behind a car in a slot of some style: the same while it
-    /// waits for room, so that none that takes more of it gives way to one that takes less.
-    pub(super) fn next_large(&self, source: usize, slot: u32, style: u32) -> u32 {
+    /// Which kind of vehicle comes next at a source, behind a car in a slot of some style: the same while it waits for
+    /// room, so that none that takes more of it gives way to one that takes less.
+    pub(super) fn next_kind(&self, source: usize, slot: u32, style: u32) -> u32 {
         let place = (source as u32 * SLOTS + slot) << STYLE_BITS;
-        self.draw(NEXT_LARGE.wrapping_add(place + style))[0]
+        self.draw(NEXT_KIND.wrapping_add(place + style))[0]
     }
 
     /// Whether of two cars that stand the one in the lower slot goes first. Both see the same.

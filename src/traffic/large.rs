@@ -58,7 +58,7 @@ constants! {
     pub(super) const LAG_OF_LARGE: i32 = time(0.5);
     /// The largest acceleration of a large vehicle: 1.3 m/s² (2^-19 m a step²).
     pub(super) const MOST_OF_LARGE: i32 = 6816;
-    /// Its speed in a bend, in sixteenths of a car's.
+    /// Its speed, in sixteenths of a car's at that place.
     pub(super) const PACE_OF_LARGE: i32 = 13;
 }
 

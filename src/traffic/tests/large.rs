@@ -81,6 +81,31 @@ fn nobody_overlaps_a_large_vehicle_or_stands_for_ever() {
 }
 
 #[test]
+fn each_kind_is_the_fraction_of_all_vehicles_that_is_asked_for() {
+    let network = named("50m");
+    let mix = Mix { vans: 0.5, rude: 0.0, large: [0.1, 0.2, 0.0] };
+    let demand = Demand::new(&network, &Demand::even(&network, 600.0), mix).unwrap();
+    let (mut vans, mut large, mut all) = (0, [0; 3], 0);
+    for seed in 0..16 {
+        let mut run = Run::new(&network, &Rules::FITTED, &demand, 24, Stream { seed, env: 0 });
+        for _ in 0..36_000 {
+            run.step(|event, cars| {
+                let Event::Left(slot) = event else { return };
+                all += 1;
+                vans += u32::from(cars[slot].length() == 7.0);
+                if let Some(kind) = cars[slot].large() {
+                    large[kind as usize - 1] += 1;
+                }
+            });
+        }
+    }
+    let found = [vans, large[0], large[1], large[2]].map(|n| f64::from(n) / f64::from(all));
+    for (found, expected) in found.into_iter().zip([0.5, 0.1, 0.2, 0.0]) {
+        assert!((found - expected).abs() < 0.02, "{found} of {all}, not {expected}");
+    }
+}
+
+#[test]
 fn they_overlap_where_their_zones_are_those_of_cars() {
     let mut network = named("16m");
     let large = network.large.as_mut().unwrap();
