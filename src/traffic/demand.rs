@@ -33,6 +33,11 @@ impl Mix {
     pub fn has_large(&self) -> bool {
         self.large.iter().any(|&fraction| 0.0 < fraction)
     }
+
+    /// Fraction of large vehicles.
+    pub fn heavy(&self) -> f64 {
+        together(0.0, self.large.map(f64::from))
+    }
 }
 
 /// Arrivals at a road.

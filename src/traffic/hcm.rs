@@ -1,6 +1,9 @@
 //! What the Highway Capacity Manual says of an entry of a roundabout.
 //!
-//! Equations of the 7th edition, chapter 22, in passenger cars: no heavy vehicles, no pedestrians.
+//! Equations of the 7th edition, chapter 22, without pedestrians.
+
+/// Passenger cars that a heavy vehicle counts for, exhibit 22-11.
+const CARS_OF_HEAVY: f64 = 2.0;
 
 /// An entry lane in the manual's terms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -14,8 +17,15 @@ pub struct Lane {
 }
 
 impl Lane {
-    /// Capacity beside a circulating flow, equations 22-1 to 22-5 (veh/h).
-    pub fn capacity(&self, circulating: f64) -> f64 {
+    /// Capacity beside a circulating flow, both with a fraction of heavy vehicles (veh/h): equations 22-1 to 22-5 of
+    /// passenger cars, and 22-9 and 22-14 for the others.
+    pub fn capacity(&self, circulating: f64, heavy: f64) -> f64 {
+        let cars = 1.0 + heavy * (CARS_OF_HEAVY - 1.0);
+        self.capacity_of_cars(circulating * cars) / cars
+    }
+
+    /// The same of passenger cars alone (pc/h).
+    fn capacity_of_cars(&self, circulating: f64) -> f64 {
         let (most, slope) = match (self.entry_lanes, self.ring_lanes, self.lane) {
             (0 | 1, 0 | 1, _) => (1380.0, 1.02e-3),
             (_, 0 | 1, _) => (1420.0, 0.91e-3),
@@ -54,7 +64,12 @@ pub fn queue_95(flow: f64, capacity: f64, period: f64) -> f64 {
     900.0 * period * (excess + root) * capacity / 3600.0
 }
 
-/// Level of service by control delay, exhibit 22-8: A to F (s).
+/// Level of service of a lane, exhibit 22-8: by its control delay (s), and F where more come than it can serve.
+pub fn level_of_lane(delay: f64, is_over_capacity: bool) -> char {
+    if is_over_capacity { 'F' } else { level_of_service(delay) }
+}
+
+/// Level of service of a whole roundabout, by control delay alone: A to F (s).
 pub fn level_of_service(delay: f64) -> char {
     match delay {
         ..=10.0 => 'A',
@@ -90,20 +105,21 @@ mod tests {
         for (name, [entry_lanes, ring_lanes, lane], flows_and_delay, level) in PUBLISHED {
             let [circulating, entering, heavy, capacity, delay] = flows_and_delay;
             let cars = 1.0 / (1.0 + heavy);
-            let found = cars * Lane { entry_lanes, ring_lanes, lane }.capacity(circulating);
+            let found = Lane { entry_lanes, ring_lanes, lane }.capacity(cars * circulating, heavy);
             assert!((found - capacity).abs() < 1.5, "{name}: {found} veh/h");
             let flow = cars * entering;
             let found = control_delay(flow, found, 0.25);
             assert!((found - delay).abs() < 0.15, "{name}: {found} s");
-            assert_eq!(level_of_service(found), level, "{name}");
+            assert_eq!(level_of_lane(found, false), level, "{name}");
             delays += found * flow;
             flows += flow;
         }
+        assert_eq!([level_of_lane(50.1, false), level_of_lane(5.0, true)], ['F', 'F']);
         assert!((delays / flows - 12.3).abs() < 0.1, "{}", delays / flows);
         // Northbound 1.9 cars.
         assert!((queue_95(247.0 / 1.02, 607.0, 0.25) - 1.9).abs() < 0.05);
         // Each equation has its own numbers: with those of another one a capacity is 3 % off and more.
-        let other = Lane { entry_lanes: 2, ring_lanes: 2, lane: 1 }.capacity(976.0) / 1.02;
+        let other = Lane { entry_lanes: 2, ring_lanes: 2, lane: 1 }.capacity_of_cars(976.0) / 1.02;
         assert!(20.0 < (other - 607.0).abs(), "{other}");
     }
 
@@ -111,7 +127,7 @@ mod tests {
     fn an_entry_of_one_lane_into_one_has_the_published_capacities() {
         // Example problem 1: 796, 769, 487 and 655 pc/h circulate.
         for (circulating, capacity) in [(796.0, 613.0), (769.0, 630.0), (487.0, 840.0), (655.0, 708.0)] {
-            let found = Lane { entry_lanes: 1, ring_lanes: 1, lane: 0 }.capacity(circulating);
+            let found = Lane { entry_lanes: 1, ring_lanes: 1, lane: 0 }.capacity(circulating, 0.0);
             assert!((found - capacity).abs() < 1.0, "{circulating}: {found}");
         }
     }

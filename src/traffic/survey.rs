@@ -19,6 +19,9 @@ pub use saturated::Saturated;
 const WARM_UP: u32 = 1_200;
 /// Behind the line a car has lost all the time that the entry costs it, speeding up again included.
 const UP_TO_SPEED: i32 = length(20.0);
+/// More come than a lane can serve where this part of them stays away: a lane that just can loses less, since up to 15
+/// wait outside.
+const LOST_OVER_CAPACITY: f64 = 0.03;
 /// A car on its arm below this speed is queued.
 const QUEUED: i32 = speed(2.0);
 
@@ -67,9 +70,16 @@ impl Counts {
         self.queues.iter_mut().zip(&other.queues).for_each(|(sum, &steps)| *sum += steps);
     }
 
-    /// Mean control delay: time lost against a car of the same style that nobody hinders (s).
-    pub fn mean_delay(&self) -> f64 {
-        self.delay / self.delayed.max(1) as f64
+    /// Mean control delay: time lost against a car of the same style that nobody hinders (s); none where no car came up
+    /// to speed.
+    pub fn mean_delay(&self) -> Option<f64> {
+        // Speeds of a car alone are rounded, so what nobody hinders may come to less than none.
+        (0 < self.delayed).then(|| (self.delay / self.delayed as f64).max(0.0))
+    }
+
+    /// Whether more came than the lane could serve.
+    pub fn is_over_capacity(&self) -> bool {
+        LOST_OVER_CAPACITY * (self.came as f64) < self.stayed as f64
     }
 
     /// Queue that was exceeded in 5 % of the time (veh).

@@ -82,13 +82,13 @@ pub(super) fn run(args: &Args, places: &[Place], mix: Mix) -> Result<(), Error> 
             counts
         };
         let runs = (0..args.runs).into_par_iter().map(counted).collect::<Vec<Vec<Counts>>>();
-        case.points(&runs, f64::from(args.runs) * f64::from(args.minutes) / 60.0)
+        case.points(&runs, f64::from(args.runs) * f64::from(args.minutes) / 60.0, mix)
     });
     let points: Vec<(Lane, Point)> = found.collect::<Vec<_>>().into_iter().flatten().collect();
     drop(bar);
     files::print(&text(&points))?;
     if let Some(plot) = &args.plot {
-        let drawn = chart(args, &points).drawn().and_then(|svg| {
+        let drawn = chart(args, mix, &points).drawn().and_then(|svg| {
             let is_png = plot.extension().is_some_and(|extension| extension == "png");
             if is_png { rasterised(&svg, WIDTH) } else { Ok(svg.into_bytes()) }
         });
@@ -100,7 +100,7 @@ pub(super) fn run(args: &Args, places: &[Place], mix: Mix) -> Result<(), Error> 
 
 impl Case<'_> {
     /// The capacity of each lane of the arm.
-    fn points(&self, runs: &[Vec<Counts>], hours: f64) -> Vec<(Lane, Point)> {
+    fn points(&self, runs: &[Vec<Counts>], hours: f64, mix: Mix) -> Vec<(Lane, Point)> {
         let of = |(index, &source): (usize, &usize)| {
             let (arm, lane) = self.place.source_name(source);
             let kind = self.survey.lane(source);
@@ -115,7 +115,7 @@ impl Case<'_> {
                 lanes: kind.name(self.place.road.is_mirrored()),
                 circulating,
                 capacity,
-                hcm: kind.capacity(circulating),
+                hcm: kind.capacity(circulating, mix.heavy()),
             };
             (kind, point)
         };
@@ -184,10 +184,11 @@ fn text(points: &[(Lane, Point)]) -> String {
 }
 
 /// The means with the least and greatest of each, and the manual's curves.
-fn chart(args: &Args, points: &[(Lane, Point)]) -> Chart {
+fn chart(args: &Args, mix: Mix, points: &[(Lane, Point)]) -> Chart {
     let mut lines = Vec::new();
     for ((kind, (name, means)), colour) in means(points).into_iter().zip(LINES) {
-        let curve = (0..=26).map(|step| f64::from(step) * 50.0).map(|flow| DVec2::new(flow, kind.capacity(flow)));
+        let curve =
+            (0..=26).map(|step| f64::from(step) * 50.0).map(|flow| DVec2::new(flow, kind.capacity(flow, mix.heavy())));
         lines.push(Line { name: None, colour, kind: Kind::Reference, points: curve.collect() });
         let spread = means.iter().map(|mean| (mean.least, mean.most)).collect();
         let points = means.iter().map(|mean| DVec2::new(mean.circulating, mean.capacity)).collect();

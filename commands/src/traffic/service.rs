@@ -1,7 +1,7 @@
 //! Delay, queue and level of service of each entry lane at a demand.
 
 use offtrack::layout::Stream;
-use offtrack::traffic::hcm::{control_delay, level_of_service, queue_95};
+use offtrack::traffic::hcm::{control_delay, level_of_lane, level_of_service, queue_95};
 use offtrack::traffic::survey::Counts;
 use offtrack::traffic::{Mix, Rules};
 use offtrack_evaluation::error::Error;
@@ -22,9 +22,9 @@ struct Found {
     runs: u32,
     minutes: u32,
     entries: Vec<Entry>,
-    /// Mean control delay of all (s), and its level.
-    delay: f64,
-    level: char,
+    /// Mean control delay of all (s), and its level; none where no car got through.
+    delay: Option<f64>,
+    level: Option<char>,
     /// Cars an hour, asked for and through.
     demand: f64,
     served: f64,
@@ -42,8 +42,9 @@ struct Entry {
     demand: f64,
     served: f64,
     circulating: f64,
-    delay: f64,
-    level: char,
+    delay: Option<f64>,
+    /// F where more came than the lane could serve.
+    level: Option<char>,
     queue_95: usize,
     /// The manual's, on a ring.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -93,27 +94,29 @@ fn found(args: &Args, place: &Place, mix: Mix, bar: &Bar) -> Result<Found, Error
         let [served, circulating] = [counts.served, counts.circulating].map(|count| count as f64 / hours);
         let hcm = place.network.has_ring.then(|| {
             let kind = survey.lane(source);
-            let capacity = kind.capacity(circulating);
+            let capacity = kind.capacity(circulating, mix.heavy());
             let delay = control_delay(demand, capacity, PERIOD);
             let queue_95 = queue_95(demand, capacity, PERIOD);
-            let level = if capacity < demand { 'F' } else { level_of_service(delay) };
+            let level = level_of_lane(delay, capacity < demand);
             Manual { lanes: kind.name(place.road.is_mirrored()), capacity, delay, level, queue_95 }
         });
-        // Speeds of a car alone are rounded, so what nobody hinders may come to less than none.
-        let delay = counts.mean_delay().max(0.0);
-        let (level, queue_95) = (level_of_service(delay), counts.queue_95());
+        let (delay, queue_95) = (counts.mean_delay(), counts.queue_95());
+        let level = match delay {
+            None => counts.is_over_capacity().then_some('F'),
+            Some(delay) => Some(level_of_lane(delay, counts.is_over_capacity())),
+        };
         Entry { arm, lane, demand, served, circulating, delay, level, queue_95, hcm }
     };
     let mut all = Counts::default();
     sums.iter().for_each(|counts| all.add(counts));
-    let delay = all.mean_delay().max(0.0);
+    let delay = all.mean_delay();
     Ok(Found {
         road: place.road.name.clone(),
         runs: args.runs,
         minutes: args.minutes,
         entries: sums.iter().enumerate().map(entry).collect(),
         delay,
-        level: level_of_service(delay),
+        level: delay.map(level_of_service),
         demand: total,
         served: all.served as f64 / hours,
         stayed: all.stayed as f64 / all.came.max(1) as f64,
@@ -121,6 +124,8 @@ fn found(args: &Args, place: &Place, mix: Mix, bar: &Bar) -> Result<Found, Error
     })
 }
 
+/// In place of what nobody was there to count for.
+const NOBODY: &str = "-";
 const HEAD: [&str; 12] = [
     "entry",
     "lane",
@@ -136,6 +141,14 @@ const HEAD: [&str; 12] = [
     "queue 95 %",
 ];
 
+fn seconds(delay: Option<f64>) -> String {
+    delay.map_or_else(|| NOBODY.to_owned(), |delay| rounded(delay, 1))
+}
+
+fn letter(level: Option<char>) -> String {
+    level.map_or_else(|| NOBODY.to_owned(), String::from)
+}
+
 impl Found {
     fn text(&self) -> String {
         let mut rows = vec![HEAD.map(str::to_owned).to_vec()];
@@ -145,7 +158,7 @@ impl Found {
         for entry in &self.entries {
             let mut row = vec![entry.arm.clone(), entry.lane.to_owned()];
             row.extend([entry.demand, entry.served, entry.circulating].map(|flow| rounded(flow, 0)));
-            row.extend([rounded(entry.delay, 1), entry.level.to_string(), entry.queue_95.to_string()]);
+            row.extend([seconds(entry.delay), letter(entry.level), entry.queue_95.to_string()]);
             if let Some(hcm) = &entry.hcm {
                 row.extend([rounded(hcm.capacity, 0), rounded(hcm.delay, 1)]);
                 row.extend([hcm.level.to_string(), rounded(hcm.queue_95, 1)]);
@@ -154,7 +167,7 @@ impl Found {
         }
         let mut all = vec!["all".to_owned(), String::new()];
         all.extend([rounded(self.demand, 0), rounded(self.served, 0), String::new()]);
-        all.extend([rounded(self.delay, 1), self.level.to_string()]);
+        all.extend([seconds(self.delay), letter(self.level)]);
         rows.push(all);
         let away = if 0.0 < self.stayed {
             format!(

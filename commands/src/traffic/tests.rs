@@ -45,6 +45,34 @@ fn every_entry_lane_has_its_flows_its_delay_and_the_manuals() {
 }
 
 #[test]
+fn a_lane_to_which_more_come_than_it_serves_is_at_level_f_and_one_to_which_nobody_comes_at_none() {
+    let words = |demand| ["20m", "--minutes", "20", "--runs", "1", "--demand", demand];
+    let full = json(&words("N-E=1800,W-E=600"));
+    let of = |arm: &str| {
+        let entries = full[0]["entries"].as_array().unwrap().iter();
+        entries.filter(|entry| entry["arm"] == arm).cloned().collect::<Vec<_>>()
+    };
+    let served = of("N").iter().map(|entry| entry["served"].as_f64().unwrap()).sum::<f64>();
+    assert!(served < 1600.0 && of("N").iter().any(|entry| entry["level"] == "F"), "{:?}", of("N"));
+    assert!(of("W").iter().all(|entry| entry["level"] != "F"), "{:?}", of("W"));
+    for entry in of("S") {
+        assert!(entry["delay"].is_null() && entry["level"].is_null() && entry["served"] == 0.0, "{entry}");
+    }
+    assert_ne!(json(&words("100"))[0]["level"], "F");
+}
+
+#[test]
+fn the_manuals_capacity_is_less_where_heavy_vehicles_are() {
+    let of = |shares: &[&str]| {
+        let words = [&["20m", "--capacity", "--minutes", "1", "--runs", "1"], shares].concat();
+        json(&words)[0]["hcm"].as_f64().unwrap()
+    };
+    // Nothing circulates in the first row; a heavy vehicle counts for two cars, a van for one.
+    let found = of(&["--share", "buses=0.1", "--share", "rigid_trucks=0.15", "--share", "vans=0.3"]);
+    assert!((found - of(&[]) / 1.25).abs() < 1e-3, "{found}");
+}
+
+#[test]
 fn who_stands_in_a_ring_that_large_vehicles_block_is_counted() {
     let shares = ["--share", "tractor_trailers=0.3", "--share", "buses=0.1"];
     let found = json(&[&["20m", "--demand", "2100", "--minutes", "20", "--runs", "2"], &shares[..]].concat());

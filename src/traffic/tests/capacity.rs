@@ -25,7 +25,7 @@ fn ratio(network: &Network, rules: &Rules, lane: Lane, circulating: f64) -> (f64
                     let passing = counts.circulating as f64 * hour;
                     entered += counts.served as f64 * hour;
                     passed += passing;
-                    expected += lane.capacity(passing);
+                    expected += lane.capacity(passing, 0.0);
                     n += 1.0;
                 }
             }
