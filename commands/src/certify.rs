@@ -100,7 +100,8 @@ fn certify(args: &Args) -> Result<(), Error> {
     let read =
         [("--policy", args.policy.as_ref().map(Path::new)), ("--benchmark", args.benchmark.as_ref().map(Path::new))];
     outputs::distinct(&[("--json", args.json.as_deref())], &read)?;
-    let scenario = roads::benchmark(args.benchmark.as_deref().unwrap_or("attard2023"))?;
+    let benchmark = args.benchmark.as_deref().unwrap_or("attard2023");
+    let scenario = roads::benchmark(benchmark)?;
     let mut scenario = roads::with_load(scenario, args.load.as_deref())?;
     let splits: Vec<Split> =
         Split::ALL.into_iter().filter(|split| args.split == "all" || args.split == split.name()).collect();
@@ -120,7 +121,9 @@ fn certify(args: &Args) -> Result<(), Error> {
         return Err(Error::Setting { name: "--split", value: args.split.clone(), expected });
     }
     let name = policy.as_ref().map(|policy| policy.name.clone());
-    let mut certificate = Certificate::new(&scenario, &world, &args.split, name, passes.clone(), &STARTS);
+    // As it was given, so that --check finds a file of one's own again.
+    let certificate = Certificate::new(&scenario, &world, &args.split, name, passes.clone(), &STARTS);
+    let mut certificate = Certificate { benchmark: benchmark.to_owned(), ..certificate };
     let started = Instant::now();
     let bar = progress::Bar::new("certifying", "starts", routes.len() * STARTS.len());
     let mut failures = 0;

@@ -98,7 +98,10 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let plot = args.plot.as_ref().map(|file| picture(file, &histograms(&distribution, args, &roads)?)).transpose()?;
     if let Some(folder) = &args.output {
         let file = |road: &RandomRoad| {
-            (format!("{}-{}-{}.toml", distribution.name, args.seed, road.index), text(&distribution, road).into_bytes())
+            (
+                format!("{}-{}-{}.toml", distribution.name, args.seed, road.index),
+                text(args, &distribution, road).into_bytes(),
+            )
         };
         let files = || {
             let all = roads.iter().map(file).chain(maps.iter().chain(&sheets).cloned());
@@ -127,12 +130,13 @@ fn free(file: &Path, bytes: &[u8]) -> Result<(), Error> {
 }
 
 /// A road's file.
-fn text(distribution: &Distribution, road: &RandomRoad) -> String {
+fn text(args: &Args, distribution: &Distribution, road: &RandomRoad) -> String {
     let RandomRoad { seed, index, attempt, .. } = road;
-    let name = &distribution.name;
+    // A path may hold line breaks, which would end the comment.
+    let (name, given) = (&distribution.name, args.distribution.escape_debug());
     format!(
         "# A random roundabout: distribution {name}, seed {seed}, index {index}, attempt {attempt}.\n\
-         # Made by: offtrack generate --distribution {name} --seed {seed} --first {index} --count 1\n\n{}",
+         # Made by: offtrack generate --distribution {given} --seed {seed} --first {index} --count 1\n\n{}",
         road.text()
     )
 }

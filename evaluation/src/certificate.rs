@@ -69,8 +69,9 @@ fn verified(
     let searched: HashSet<&str> = certificate.routes.iter().map(|route| route.name.as_str()).collect();
     if let Some(&route) = routes.iter().find(|&&route| !searched.contains(world.route_names[route as usize].as_str())) {
         let (name, benchmark) = (&world.route_names[route as usize], &scenario.name);
-        let message =
-            format!("has no route {name}; make one with `offtrack certify --benchmark {benchmark} --json FILE`");
+        let message = format!(
+            "has no route {name} of {benchmark}; make one with `offtrack certify --benchmark BENCHMARK --json FILE`"
+        );
         return Err(Error::contents(path, message));
     }
     Ok((certificate, sequences))

@@ -224,7 +224,7 @@ pub(super) struct WrittenStart {
 
 /// A number, or `[least, greatest]`.
 #[derive(Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "must be a number or [least, greatest]")]
 pub(super) enum WrittenRange {
     One(f64),
     Range([f64; 2]),
@@ -318,7 +318,7 @@ pub(super) struct WrittenProcedural {
 
 /// `"all"`, or routes by their name within the roundabout.
 #[derive(Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "must be \"all\" or a list of routes by their names")]
 pub(super) enum WrittenChoice {
     Word(String),
     Names(Vec<String>),
@@ -348,7 +348,7 @@ pub(super) struct WrittenLane {
 
 /// A road's id, a text in OpenDRIVE and mostly a number.
 #[derive(Debug, Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "must be a road's id, a number or a text")]
 pub(super) enum WrittenId {
     Number(u64),
     Text(String),

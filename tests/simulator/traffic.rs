@@ -252,6 +252,7 @@ fn a_benchmark_with_a_bad_key_of_traffic_is_refused_by_key_and_value() {
         ("demand = [300]\nvans = 0.6\nbuses = 0.5", "traffic.vans and larger vehicles together: 1.1"),
         ("demand = [300]\ndrivers = \"drunk\"", "unknown variant `drunk`"),
         ("demand = [300]\nrude = [0.3, 0.1]", "traffic.rude: [0.3, 0.1]"),
+        ("demand = [300]\nrude = \"x\"", "must be a number or [least, greatest]"),
         ("demand = [300]\nwaiting = -5", "traffic.waiting: -5 s"),
         ("demand = [300]\nhindrance = 1e7", "traffic.hindrance: 1"),
         ("demand = [300]\n[time]\nstep = 0.05", "time.step: 0.05 s"),

@@ -77,8 +77,11 @@ fn read(args: &Args, file: &Path, n_runs: usize, display: &Display, caller: Call
 fn config(args: &Args, file: &Path) -> Result<Config, Error> {
     let mut config = Config::read_for(file, args.benchmark.as_deref(), &args.settings)?;
     config.override_with(args.seed, args.minutes, args.steps, args.envs)?;
-    let flag = args.steps.map(|steps| PathBuf::from(format!("--steps {steps}")));
-    config.check_budget(flag.as_deref().unwrap_or(file))?;
+    config.check_budget(&match (args.steps, args.envs) {
+        (Some(steps), _) => PathBuf::from(format!("--steps {steps}")),
+        (None, Some(envs)) => PathBuf::from(format!("{} with --envs {envs}", file.display())),
+        (None, None) => Config::origin(file, args.benchmark.as_deref(), &args.settings),
+    })?;
     config.from = args.from.clone().or(config.from);
     if let Some(adapter) = &args.adapter {
         if config.device == config::Device::Cpu {

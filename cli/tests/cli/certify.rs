@@ -210,6 +210,8 @@ fn a_policy_may_be_among_the_candidates_and_must_fit_the_benchmark() {
     let certificate = place.json("c.json");
     assert_eq!((&certificate["policy"], &certificate["split"]), (&Value::from(policy.as_str()), &Value::from("train")));
     assert_eq!(certificate["routes"].as_array().map(Vec::len), Some(1));
+    // It says where its benchmark is, a file of one's own.
+    succeed(&offtrack(&["certify", "--verify", &place.text("c.json")]));
     assert!(refusal(&certify("attard2023"), 2).contains("another action table"));
 }
 

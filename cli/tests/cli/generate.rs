@@ -55,6 +55,12 @@ fn generated_files_are_the_roads_of_the_library_and_a_second_run_writes_the_same
     let sheet = std::fs::read_to_string(place.file("a/contact-sheet.svg")).unwrap();
     assert!(sheet.contains("3 random roads: distribution wide, seed 7") && sheet.contains("wide/7/12"));
     assert!(std::fs::read(place.file("a/contact-sheet.png")).unwrap().starts_with(b"\x89PNG"));
+    let own = place.text("own.toml");
+    std::fs::copy(Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/distributions/wide.toml"), &own).unwrap();
+    let of_own = ["generate", "--distribution", &own, "--count", "1", "-o", &place.text("own")];
+    succeed(&cached(&place, &of_own));
+    let text = std::fs::read_to_string(place.file("own/own-0-0.toml")).unwrap();
+    assert!(text.contains(&format!("\n# Made by: offtrack generate --distribution {own} --seed 0 ")), "{text}");
     assert_eq!(run("b").replace("/b", "/a"), said);
     for file in ["wide-7-11.toml", "contact-sheet.svg", "contact-sheet.png"] {
         assert_eq!(

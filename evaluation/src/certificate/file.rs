@@ -195,7 +195,7 @@ impl Certificate {
                 let (benchmark, made_for) = (&scenario.name, &self.benchmark);
                 let message = format!(
                     "was made for {made_for} with another {key}: {there} there, {here} in {benchmark}; make one with \
-                     `offtrack certify --benchmark {benchmark} --json FILE`"
+                     `offtrack certify --benchmark BENCHMARK --json FILE`"
                 );
                 return Err(Error::contents(file, message));
             }
