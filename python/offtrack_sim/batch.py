@@ -231,7 +231,7 @@ class Batch(_offtrack.Batch):
         return found
 
     def ended(self) -> Ends | None:
-        """The episodes that the last step ended, None where it ended none."""
+        """The episodes that the last step ended, None where it ended none or ``begin`` or ``restore`` came after it."""
         found = self.last_ended()
         return None if found is None else Ends(*found)
 
