@@ -187,6 +187,9 @@ fn an_apron_is_a_border_of_the_map_that_trucks_have_access_to_and_is_read_back_w
         assert_eq!(ground(&text.replace(access, "")).ground.aprons, []);
         let half = ground(&text.replacen(access, "", 1));
         assert!(half.ground.aprons.is_empty() && half.warnings.iter().any(|warning| warning.contains("apron")));
+        // One that covers the whole island, as in the middle of a mini-roundabout: half a metre stays solid.
+        let covers = ground(&text.replace("a=\"2.000000000\"", &format!("a=\"{:.9}\"", road.island_radius() - 1e-3)));
+        assert_eq!(covers.ground.aprons, [Curve::circle(DVec2::ZERO, 0.5)], "{:?}", covers.warnings);
     }
 }
 

@@ -29,6 +29,8 @@ const BESIDE_RING: f64 = 6.0;
 const ONE_LANE: f64 = 1.2;
 /// How far an island may reach, in its radii: rings are not quite round.
 const OVAL: f64 = 1.4;
+/// Radius of what stays solid of an island that an apron covers (m).
+const CORE: f64 = 0.5;
 /// Most arms of a place.
 const MOST_ARMS: usize = 8;
 
@@ -195,12 +197,15 @@ fn island(map: &Map, ring: &Ring, extent: f64) -> Option<Island> {
     let edges = clipped(&surface.edges, extent).into_iter().find(around)?;
     let island = faces.iter().skip(1).find(|hole| encloses_origin(hole))?;
     let (centre, radius, _) = fitted_circle(&densified(&points(island), 0.1))?;
-    // Where it leads all around, what is within it is a hole.
+    // Where it leads all around, what is within it is a hole; one that covers the island has none.
     let aprons = clipped(&surface.aprons, OVAL * radius);
-    let apron = aprons.iter().flat_map(|part| part.iter().skip(1)).find(|hole| encloses_origin(hole));
+    let hole = aprons.iter().flat_map(|part| part.iter().skip(1)).find(|hole| encloses_origin(hole));
+    let covers = hole.is_none() && aprons.iter().any(|part| encloses_origin(&part[0]));
+    let inner = hole.and_then(|hole| outline(&vec![hole.clone()], centre).loops.pop());
+    let apron = inner.or_else(|| covers.then(|| Curve::circle(DVec2::ZERO, CORE)));
     Some(Island {
         has_open_apron: !aprons.is_empty() && apron.is_none(),
-        apron: apron.and_then(|hole| outline(&vec![hole.clone()], centre).loops.pop()),
+        apron,
         origin: ring.centre + centre,
         radius,
         faces: outline(&faces, centre),
