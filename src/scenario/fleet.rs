@@ -85,22 +85,39 @@ impl Fleet {
     /// The table of vehicles, class by class: a function of the fleet alone.
     pub fn table(&self) -> Vec<Entry> {
         let shares = self.shares();
-        let n_rows = self.n_rows(&shares);
+        let entry = |(row, class): (usize, usize)| {
+            let (member, load, _) = shares[class];
+            Entry { class, vehicle: self.draw.applied(&member.vehicle, load, &Drawn::of_row(row as u32)) }
+        };
+        self.rows(&shares).into_iter().enumerate().map(entry).collect()
+    }
+
+    /// The class of each row of the table.
+    fn rows(&self, shares: &[(&Member, &str, f64)]) -> Vec<usize> {
+        let n_rows = self.n_rows(shares);
         let mut rows = Vec::with_capacity(n_rows);
         let mut end = 0.0;
-        for (class, (member, load, share)) in shares.iter().enumerate() {
+        for (class, (.., share)) in shares.iter().enumerate() {
             end += share;
             // The middle of row i lies at (i + 1/2) / n of all shares.
             while rows.len() < n_rows && (rows.len() as f64 + 0.5) / (n_rows as f64) < end {
-                let vehicle = self.draw.applied(&member.vehicle, load, &Drawn::of_row(rows.len() as u32));
-                rows.push(Entry { class, vehicle });
+                rows.push(class);
             }
         }
         // The sum of all shares may be a little less than 1.
-        if let Some(last) = rows.last().cloned() {
+        if let Some(&last) = rows.last() {
             rows.resize(n_rows, last);
         }
         rows
+    }
+
+    /// A vehicle with a load that is too seldom to have a row of the table, its probability, and the number of rows.
+    pub(super) fn without_row(&self) -> Option<(&Member, &str, f64, usize)> {
+        let shares = self.shares();
+        let rows = self.rows(&shares);
+        let missing = (0..shares.len()).find(|class| rows.binary_search(class).is_err())?;
+        let (member, load, share) = shares[missing];
+        Some((member, load, share, rows.len()))
     }
 
     /// Rows of the table.

@@ -205,6 +205,10 @@ fn what_is_wrong_with_a_fleet_is_named() {
         (format!("{member}share = 0"), "vehicle[0].share: 0; must lie in"),
         (format!("{member}[draw]\nslip = [1.1, 0.9]"), "draw.slip: [1.1, 0.9]; must be [least, greatest]"),
         (format!("{member}[draw]\nslip = [0.9, 100]"), "draw.slip[1]: 100; must lie in 0..10"),
+        (
+            format!("{member}[[vehicle]]\nfile = \"us_wb62\"\nloads = {{ empty = 1 }}\nshare = 0.0001"),
+            "draw.n_vehicles: 4096 vehicles, of which us_wb62 empty is 1.0e-4; none would be one",
+        ),
         (format!("{member}[draw]\nn_vehicles = 0"), "draw.n_vehicles: 0; must lie in 1..65536"),
         (
             format!("{member}[draw]\nsteer_delay = [0.0, 0.5]"),

@@ -127,6 +127,11 @@ fn drawn(reader: &Reader, members: Vec<Member>, written: &WrittenDraw) -> Result
             .map(|range| range.map(f64::to_radians)),
     };
     let fleet = Fleet { members, draw, n_vehicles };
+    if let Some((member, load, share, n_rows)) = fleet.without_row() {
+        let value = format_args!("{n_rows} vehicles, of which {} {load} is {share:.1e}", member.name);
+        let expected = "none would be one: more vehicles, a larger share, or 0 for what is not to drive";
+        return Err(reader.invalid("draw.n_vehicles", value, expected));
+    }
     for (member, vehicle) in fleet.extremes() {
         check_vehicle(&vehicle).map_err(|wrong| {
             let expected = format!("of {} with all ranges at their ends: {}", member.name, wrong.expected);
