@@ -68,7 +68,7 @@ pub fn run(args: &Args) -> Result<bool, Error> {
     outputs::distinct(&written, &read)?;
     let mut rows = Vec::new();
     for (file, entry) in args.entries.iter().zip(&entries) {
-        rows.push(row(args, file, entry)?);
+        rows.push(row(args, file, entry).map_err(|error| of_entry(file, error))?);
     }
     let all_hold = rows.iter().all(|row| row.differs.is_empty());
     let board = Board::new(rows);
@@ -83,6 +83,13 @@ pub fn run(args: &Args) -> Result<bool, Error> {
     }
     files::print(&board.markdown())?;
     Ok(all_hold || !args.check)
+}
+
+/// An error about what an entry asks for, by the entry's name.
+fn of_entry(file: &Path, error: Error) -> Error {
+    let message = error.to_string();
+    let is_named = message.starts_with(&shown_path(file).to_string());
+    if error.is_wrong_input() && !is_named { Error::contents(file, message) } else { error }
 }
 
 /// The row of an entry, as it is simulated; what differs from its claims is said.

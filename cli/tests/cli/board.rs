@@ -97,6 +97,9 @@ fn recorded_actions_are_an_entry_without_a_policy_and_a_policy_drives_on_roads_t
     std::fs::write(place.file("random.json"), "{}").unwrap();
     let told = refusal(&offtrack(&["board", &recorded]), 2);
     assert!(told.contains("random.json: ") && told.contains("`evaluate --actions` writes such files"), "{told}");
+    let gone = entry(&place, "gone.toml", "policy = \"gone.safetensors\"");
+    let told = refusal(&offtrack(&["board", &gone]), 2);
+    assert!(told.contains("gone.toml: ") && told.contains("gone.safetensors"), "{told}");
 }
 
 #[test]

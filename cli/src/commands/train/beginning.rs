@@ -20,9 +20,11 @@ pub fn line(config: &Config, file: &Path, n_runs: usize) -> String {
         (false, Some(_)) => String::new(),
         (false, None) => "; while it trains a line says how long is left".to_owned(),
     };
+    // Roads are read after this, and a benchmark of one's own may have none to be tested on.
+    let condition = if Path::new(&config.benchmark).extension().is_some() { ", if it has test routes" } else { "" };
     let seeds = if n_runs == 1 { String::new() } else { format!("{n_runs} seeds, each ") };
     format!(
-        "{}: {seeds}trains for {}{time}; then evaluates on {}. Ctrl-C stops it; offtrack --help lists all commands\n",
+        "{}: {seeds}trains for {}{time}; then evaluates on {}{condition}. Ctrl-C stops it; offtrack --help lists all commands\n",
         shown_path(file),
         budget.join(" or "),
         printable(&config.benchmark)
@@ -46,6 +48,9 @@ mod tests {
         assert!(said(&[], 1).starts_with(usual) && said(&["seed=3"], 1).starts_with(usual), "{}", said(&[], 1));
         assert!(
             said(&["steps=9600000"], 1).contains("of 512 trucks; while it trains a line says how long is left; then")
+        );
+        assert!(
+            said(&["benchmark=mine.toml"], 1).contains("then evaluates on mine.toml, if it has test routes. Ctrl-C")
         );
         let timed = said(&["steps=", "minutes=2"], 5);
         assert!(timed.starts_with("default: 5 seeds, each trains for 2 min; then evaluates on attard2023."), "{timed}");
