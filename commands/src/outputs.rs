@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use offtrack::files::reader::{TEXT_LIMIT, read_text};
 use offtrack_evaluation::error::Error;
+use toml::Value;
 
 /// A flag and the file that it names, if it is given.
 pub type Named<'a> = (&'static str, Option<&'a Path>);
@@ -12,12 +14,20 @@ pub fn of_run(folder: &Path) -> [PathBuf; 3] {
     ["config.toml", "metrics.csv", "report.json"].map(|name| folder.join(name))
 }
 
-/// An error if two of the files to be written are one, or one of them is a file that is read. The second would replace
-/// the first.
+/// Files that lead from one to the next by the names in them, at most: a benchmark, a roundabout, its map.
+const DEPTH: usize = 3;
+
+/// An error if two of the files to be written are one, or one of them is a file that is read, or one that such a file
+/// names: a vehicle of a benchmark. The second would replace the first.
 pub fn distinct(written: &[Named], read: &[Named]) -> Result<(), Error> {
+    let mut named = Vec::new();
+    for (flag, file) in read {
+        file.iter().for_each(|file| add_named(file, DEPTH, &mut |file| named.push((*flag, file))));
+    }
+    let named: Vec<Named> = named.iter().map(|(flag, file)| (*flag, Some(file.as_path()))).collect();
     for (index, (flag, file)) in written.iter().enumerate() {
         let Some(file) = file else { continue };
-        let others = written[..index].iter().chain(read);
+        let others = written[..index].iter().chain(read).chain(&named);
         if let Some((other, _)) = others.into_iter().find(|(_, other)| other.is_some_and(|other| is_same(file, other)))
         {
             let expected = format!("is the file of {other} too: name another one");
@@ -25,6 +35,28 @@ pub fn distinct(written: &[Named], read: &[Named]) -> Result<(), Error> {
         }
     }
     Ok(())
+}
+
+/// Tells of the files whose paths stand as texts in a TOML file, and in those.
+fn add_named(file: &Path, depth: usize, tell: &mut impl FnMut(PathBuf)) {
+    let is_toml = 0 < depth && file.extension().is_some_and(|extension| extension == "toml");
+    let text = is_toml.then(|| read_text(file, TEXT_LIMIT).ok()).flatten();
+    let mut values: Vec<Value> =
+        text.and_then(|text| text.parse::<toml::Table>().ok()).map(Value::Table).into_iter().collect();
+    while let Some(value) = values.pop() {
+        match value {
+            Value::Table(table) => values.extend(table.into_iter().map(|(_, value)| value)),
+            Value::Array(array) => values.extend(array),
+            Value::String(text) => {
+                let named = file.parent().unwrap_or(Path::new("")).join(text);
+                if named.is_file() {
+                    add_named(&named, depth - 1, tell);
+                    tell(named);
+                }
+            }
+            _ => {}
+        }
+    }
 }
 
 /// Whether two paths lead to one file, which may not be there yet. What is written to a device or a pipe replaces

@@ -62,7 +62,14 @@ fn no_output_replaces_what_the_command_reads_under_another_name() {
     std::os::unix::fs::symlink(place.file("seen.json"), place.file("seen.html")).unwrap();
     let (to, link) = (place.text("seen.json"), place.text("seen.html"));
     let yields = format!("yields:{policy}");
-    let cases: [(&[&str], &str); 7] = [
+    // Written over the vehicle of its benchmark.
+    let benchmark = place.text("benchmark.toml");
+    let text = std::fs::read_to_string(repository().join("scenarios/attard2023.toml")).unwrap();
+    std::fs::write(&benchmark, text.replace("vehicles/daf_xf.toml", "truck.toml")).unwrap();
+    let truck = place.text("truck.toml");
+    std::fs::copy(repository().join("scenarios/vehicles/daf_xf.toml"), &truck).unwrap();
+    let cases: [(&[&str], &str); 8] = [
+        (&["evaluate", "--benchmark", &benchmark, "--json", &truck], "--json: {}; is the file of --benchmark too"),
         (&["traffic", &own, "--json", &own], "--json: {}; is the file of ROAD too"),
         (&["scale", "--benchmark", &own, "--envs", "8", "--json", &own], "--json: {}; is the file of --benchmark too"),
         (&["evaluate", "--policy", &yields, "--json", &policy], "--json: {}; is the file of --policy too"),
