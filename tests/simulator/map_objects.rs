@@ -1,5 +1,7 @@
 //! Maps that contradict themselves or say more than is read: what is said of it, and what is left alone.
 
+use offtrack::map::opendrive::Options;
+
 use crate::map_kinds::{imported, parsed, plain};
 
 /// The ring with a road far from it, 100 m long, that has these objects.
@@ -46,6 +48,8 @@ fn an_island_of_several_outlines_is_read_whole_and_one_that_is_repeated_is_warne
     let both = on_arm(&island(&[one.clone(), other.clone()].concat()));
     assert_eq!(both, on_arm(&[island(&one), island(&other)].concat()));
     assert_ne!(both, on_arm(&island(&one)));
+    // One kerb does not make a map whose kerbs lie around all that is solid: its splitter islands stay.
+    assert_eq!(on_arm(&island(&one)).loops.len(), on_arm("").loops.len() + 1);
     let repeated = format!(
         "{ISLAND} length=\"4\" width=\"1\"><repeat s=\"10\" length=\"20\" distance=\"5\" tStart=\"0\" tEnd=\"0\"/>\
          </object>"
@@ -89,4 +93,67 @@ fn a_junction_that_is_not_listed_is_no_dead_end() {
     let map = parsed(&format!("{before}{after}"));
     let missing: Vec<&str> = map.warnings().filter(|warning| warning.contains("is linked to junction")).collect();
     assert!(!missing.is_empty() && missing.iter().all(|warning| warning.ends_with("which the file does not have")));
+}
+
+/// The ring twice, so far apart (m): the eastern arm of one is the western arm of the other.
+fn dumbbell(apart: f64) -> String {
+    let ids = (1..=4).chain([100, 200, 300, 400, 900].into_iter().flat_map(|first| first..first + 4));
+    let ids: Vec<u32> = ids.filter(|&id| id != 3).collect();
+    let moved = |line: &str| {
+        // The common arm is road 1, whose end is there.
+        let mut line = line.replace("elementId=\"3\" contactPoint=\"start\"", "elementId=\"+\" contactPoint=\"end\"");
+        line = line.replace("incomingRoad=\"3\"", "incomingRoad=\"+\"");
+        for id in &ids {
+            for (before, after) in [
+                ("elementId=\"", "\""),
+                ("incomingRoad=\"", "\""),
+                ("connectingRoad=\"", "\""),
+                (" id=\"", "\" junction"),
+                ("name=\"\" id=\"", "\">"),
+                ("junction=\"", "\""),
+            ] {
+                line = line.replace(&format!("{before}{id}{after}"), &format!("{before}{}{after}", id + 5000));
+            }
+        }
+        if let Some((before, after)) = line.split_once("<geometry s=\"0\" x=\"") {
+            let (x, rest) = after.split_once('"').unwrap();
+            line = format!("{before}<geometry s=\"0\" x=\"{}\"{rest}", x.parse::<f64>().unwrap() + apart);
+        }
+        let turned = match &line {
+            line if line.contains(" id=\"5302\"") => line.replace("<successor id=\"-1\"/>", "<successor id=\"1\"/>"),
+            line if line.contains(" id=\"5402\"") => {
+                line.replace("<predecessor id=\"1\"/>", "<predecessor id=\"-1\"/>")
+            }
+            line if line.contains("id=\"5902\">") => line.replace("from=\"1\"", "from=\"-1\""),
+            line => line.clone(),
+        };
+        turned.replace("\"+\"", "\"1\"")
+    };
+    let text = plain();
+    let parts = text.lines().filter(|line| line.starts_with("<road") || line.starts_with("<junction"));
+    let other: Vec<String> = parts.filter(|line| !line.contains(" id=\"3\" junction")).map(moved).collect();
+    let arm = text.lines().find(|line| line.contains(" id=\"1\" junction")).unwrap();
+    let link = "<successor elementType=\"junction\" elementId=\"5902\"/></link><planView>";
+    let length = format!("length=\"{}\"", apart - 76.0);
+    let common = arm.replace("length=\"70\"", &length).replacen("</link><planView>", link, 1);
+    text.replace(arm, &common).replace("</OpenDRIVE>", &format!("{}\n</OpenDRIVE>", other.join("\n")))
+}
+
+#[test]
+fn an_arm_that_leads_into_another_ring_nearby_is_said_to_end_there_and_not_to_lack_a_link() {
+    let map = parsed(&dumbbell(80.0));
+    assert_eq!(map.rings().len(), 2);
+    for ring in map.rings() {
+        let imported = map.ground(&ring, &Options::default()).unwrap();
+        assert_eq!(imported.ground.lines.len(), 16);
+        assert_eq!(imported.warnings.len(), 3, "{:?}", imported.warnings);
+        assert!(
+            imported.warnings.iter().all(|warning| warning.contains("closes a ring there")),
+            "{:?}",
+            imported.warnings
+        );
+    }
+    // Farther apart the arm reaches the edge of what is driven.
+    let apart = parsed(&dumbbell(100.0));
+    assert_eq!(apart.ground(&apart.rings()[0], &Options::default()).unwrap().warnings, [""; 0]);
 }

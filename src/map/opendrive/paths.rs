@@ -64,6 +64,10 @@ impl Network<'_> {
         let path = self.path(*strip);
         let end = if at_end { path.last() } else { path.first() }?;
         (end.length() < extent).then_some(())?;
+        let beyond = if at_end { &self.graph.next[*strip] } else { &self.graph.previous[*strip] };
+        if beyond.iter().any(|strip| way.contains(strip)) {
+            return Some(format!("{} closes a ring there", self.name(*strip)));
+        }
         self.strips.get(strip).map(|strip| reason(self.records, strip, at_end))
     }
 
