@@ -8,6 +8,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use offtrack::files::reader::printable;
 use offtrack::layout::Start;
 use offtrack::map::procedural;
 use offtrack::scenario::Split;
@@ -159,7 +160,7 @@ fn table(certificate: &Certificate) -> String {
     let _ = writeln!(
         text,
         "{}, {} routes: searched with {} candidates at each depth, {} env steps, {:.0} s",
-        certificate.benchmark,
+        printable(&certificate.benchmark),
         certificate.split,
         passes.join(", then "),
         certificate.env_steps,
