@@ -147,6 +147,7 @@ impl Observer {
 
     /// Begins an episode at any place along the route, with the wheels straight and the truck's speed as its target, as
     /// the simulator begins one: the clock begins, what lies behind counts as passed, and the start is not judged.
+    /// Where a truck stands exactly at a waypoint, rounding decides whether that or the one after it is the next.
     ///
     /// # Errors
     ///

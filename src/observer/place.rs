@@ -6,10 +6,6 @@ use crate::engine::cpu::follow::distance_to_segment;
 use crate::layout::WaypointRow;
 use crate::layout::angle::direction;
 
-/// A truck this near to the line through a waypoint is at it, as one that begins along its route, and the next one is
-/// that after it (m).
-const AT_WAYPOINT: f32 = 1e-3;
-
 /// Index of the next waypoint of a truck whose reference point and heading these are: on the nearest segment of those
 /// that lead its way, or of all where none does, since a route comes back beside itself where a truck turns round.
 pub(super) fn next_waypoint(waypoints: &[WaypointRow], point: Vec2, heading: f32) -> u32 {
@@ -24,12 +20,8 @@ pub(super) fn next_waypoint(waypoints: &[WaypointRow], point: Vec2, heading: f32
         }
     }
     // In a bend the lines through the waypoints, which say what was passed, do not bound what is nearest to a segment.
-    let beyond = |index: usize| (point - waypoints[index].position).dot(waypoints[index].direction);
-    while 1 < nearest && beyond(nearest - 1) < -AT_WAYPOINT {
+    while 1 < nearest && (point - waypoints[nearest - 1].position).dot(waypoints[nearest - 1].direction) < 0.0 {
         nearest -= 1;
-    }
-    if nearest + 1 < waypoints.len() && beyond(nearest).abs() <= AT_WAYPOINT {
-        nearest += 1;
     }
     nearest as u32
 }

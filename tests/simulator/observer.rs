@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::DVec2;
-use offtrack::layout::{Control, Ended, Start, Truck};
+use offtrack::layout::{Control, Ended, Truck};
 use offtrack::observer::{Observed, Observer, Pose, State, Telemetry};
 use offtrack::scenario::Scenario;
 use offtrack::simulator::{Batch, Error, RouteChoice, Simulator};
@@ -80,23 +80,6 @@ fn an_observer_sees_what_the_simulator_does_to_the_last_bit_on_every_route() {
     for (name, n_trucks) in [("attard2023", 300), ("laden2026", 300), ("maps2026", 300)] {
         let world = Arc::new(benchmark(name).1);
         assert!(100 < compare(name, &world, n_trucks), "{name}: hardly an episode ended");
-    }
-}
-
-#[test]
-fn an_observer_begins_along_a_route_at_the_waypoint_at_which_the_simulator_does() {
-    for name in ["attard2023", "maps2026"] {
-        let world = Arc::new(benchmark(name).1);
-        let routes = || (0..world.routes.len() as u32).flat_map(|route| [route; 50]);
-        let mut simulator =
-            Simulator::new(world.clone(), routes().count(), 3, RouteChoice::Fixed(routes().collect())).unwrap();
-        let start = |env: usize| Start {
-            along: (env % 50) as f32 / 49.0,
-            offset: [-0.5, 0.0, 0.3][env % 3],
-            ..Start::default()
-        };
-        simulator.reset_from(&(0..routes().count()).map(start).collect::<Vec<Start>>()).unwrap();
-        observers(&world, simulator.batch());
     }
 }
 
