@@ -122,9 +122,9 @@ fn certify(args: &Args) -> Result<(), Error> {
         return Err(Error::Setting { name: "--split", value: args.split.clone(), expected });
     }
     let name = policy.as_ref().map(|policy| policy.name.clone());
-    // As it was given, so that --check finds a file of one's own again.
-    let certificate = Certificate::new(&scenario, &world, &args.split, name, passes.clone(), &STARTS);
-    let mut certificate = Certificate { benchmark: benchmark.to_owned(), ..certificate };
+    let mut certificate = Certificate::new(&scenario, &world, &args.split, name, passes.clone(), &STARTS);
+    // As it was given, so that --verify finds a file of one's own again.
+    certificate.benchmark = benchmark.to_owned();
     let started = Instant::now();
     let bar = progress::Bar::new("certifying", "starts", routes.len() * STARTS.len());
     let mut failures = 0;

@@ -16,12 +16,12 @@ use crate::geometry::area::{Area, counter_clockwise, densified, points};
 pub(super) const GAP: f64 = 0.02;
 /// Voids narrower than this are paved where they touch a lane (m).
 const SLIVER: f64 = 0.6;
-/// A void that holds a circle of this radius is solid where a map has not its kerbs around all that is solid (m).
+/// A void that holds a circle of this radius is solid (m).
 const INSCRIBED: f64 = 0.5;
-/// The same of one beside a lane where a map has (m).
+/// The same of a void beside a lane in a map that has kerbs around all that is solid (m).
 const INSCRIBED_AMONG_KERBS: f64 = 3.0;
-/// A map has where kerbs lie along this fraction of the edge of what is paved: 0.4 to 0.7 in maps that are drawn so,
-/// below 0.01 where there is one kerb.
+/// Fraction of the edge of what is paved along which kerbs lie in such a map, at least. It is 0.4 to 0.7 in maps that
+/// are drawn so, and below 0.01 where there is one kerb.
 const KERBED: f64 = 0.25;
 /// Drivable strips narrower than this are solid (m).
 const SLIT: f64 = 0.2;

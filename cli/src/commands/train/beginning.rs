@@ -24,7 +24,8 @@ pub fn line(config: &Config, file: &Path, n_runs: usize) -> String {
     let condition = if Path::new(&config.benchmark).extension().is_some() { ", if it has test routes" } else { "" };
     let seeds = if n_runs == 1 { String::new() } else { format!("{n_runs} seeds, each ") };
     format!(
-        "{}: {seeds}trains for {}{time}; then evaluates on {}{condition}. Ctrl-C stops it; offtrack --help lists all commands\n",
+        "{}: {seeds}trains for {}{time}; then evaluates on {}{condition}. Ctrl-C stops it; offtrack --help lists all \
+         commands\n",
         shown_path(file),
         budget.join(" or "),
         printable(&config.benchmark)
