@@ -147,9 +147,18 @@ impl Drop for Name {
 /// Removes the temporary files that this process is writing. For a process about to end at once: whatever is being
 /// written is given up.
 pub fn remove_temporaries() {
-    for path in NAMES.lock().unwrap_or_else(PoisonError::into_inner).drain(..) {
-        let _ = fs::remove_file(path);
-    }
+    remove_listed(|_| true);
+}
+
+/// Removes those of this process's temporary files of which `is_removed` says so.
+pub(super) fn remove_listed(is_removed: impl Fn(&Path) -> bool) {
+    NAMES.lock().unwrap_or_else(PoisonError::into_inner).retain(|path| {
+        let is_removed = is_removed(path);
+        if is_removed {
+            let _ = fs::remove_file(path);
+        }
+        !is_removed
+    });
 }
 
 /// Removes temporary files that nobody writes any more from `folder`, the first time that this process writes there.
