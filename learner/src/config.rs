@@ -250,6 +250,9 @@ pub struct Refinement {
     pub critic_iterations: u64,
     /// Power of the clearance term in the reward.
     pub clearance_power: f64,
+    /// An episode that runs out of time has failed: it gets the reward of a failure, and has no value after its end.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub late_fails: bool,
     /// Other weights than those of the run so far in the reward.
     #[serde(default, skip_serializing_if = "RewardChanges::is_empty")]
     pub reward: RewardChanges,

@@ -22,6 +22,8 @@ pub struct Steps {
     pub reward: Vec<f32>,
     /// Whether and why the episode ended, `(rows)`.
     pub ended: Vec<Ended>,
+    /// Whether nothing comes after the end of an episode's time.
+    pub late_fails: bool,
     /// Normalised observations after the steps whose value no later row has: those that ran out of time, and the last
     /// of each truck, in the order of their rows.
     pub next_observation: Vec<f32>,
@@ -30,7 +32,9 @@ pub struct Steps {
 impl Steps {
     /// Whether the value after a row is that of `next_observation`.
     pub fn needs_next(&self, row: usize, n_rows: usize) -> bool {
-        !self.ended[row].terminated() && (self.ended[row].truncated() || n_rows <= row + self.n_envs)
+        let ended = self.ended[row];
+        let is_last = ended.terminated() || self.late_fails && ended.truncated();
+        !is_last && (ended.truncated() || n_rows <= row + self.n_envs)
     }
 
     /// The observations of some rows, `[rows, values]`.

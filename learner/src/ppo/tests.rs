@@ -21,6 +21,7 @@ fn settings() -> Refinement {
         advantage_limit: 4.0,
         critic_iterations: 0,
         clearance_power: 1.0,
+        late_fails: false,
         reward: RewardChanges::default(),
     }
 }
@@ -39,6 +40,7 @@ fn steps(reward: &[f32], ended: &[Ended], next_observation: &[f32]) -> Steps {
         log_prob: vec![0.0; reward.len()],
         reward: reward.to_vec(),
         ended: ended.to_vec(),
+        late_fails: false,
         next_observation: next_observation.to_vec(),
     }
 }
@@ -59,6 +61,7 @@ fn bandit(actor: &Mlp, seen: &[f32], reward: impl Fn(f32, u32) -> f32, rng: &mut
             .collect(),
         reward: seen.iter().zip(&action).map(|(&seen, &action)| reward(seen, action)).collect(),
         ended: vec![Ended::Arrived; seen.len()],
+        late_fails: false,
         next_observation: Vec::new(),
         action,
     }
@@ -83,6 +86,12 @@ fn advantages_are_discounted_sums_of_td_errors_within_an_episode() {
     let first = [1.0 + 15.0 - 10.0 + 0.25 * second[0], 2.0 + 50.0 - 20.0];
     assert_eq!(advantage, [first, second, last].concat());
     assert_eq!(returned, advantage.iter().zip(values).map(|(advantage, value)| advantage + value).collect::<Vec<_>>());
+    // Where who is late has failed, nothing comes after the second truck's first step.
+    let steps = Steps { late_fails: true, ..steps };
+    let needs: Vec<usize> = (0..6).filter(|&row| steps.needs_next(row, 6)).collect();
+    assert_eq!(needs, [4, 5]);
+    let (late, _) = steps.advantages(&values, &[200.0, 300.0], 0.5, 0.5);
+    assert_eq!(late, [&[first[0], 2.0 - 20.0][..], &advantage[2..]].concat());
 }
 
 #[test]

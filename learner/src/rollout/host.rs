@@ -241,7 +241,8 @@ impl<const N: usize> Rollout for HostRollout<N> {
         let own = self.simulator.world().reward;
         let mut weights = own;
         settings.reward.apply_to_world(&mut weights);
-        let mut steps = Steps { n_envs, n_values: N, ..Steps::default() };
+        let late_fails = settings.late_fails;
+        let mut steps = Steps { n_envs, n_values: N, late_fails, ..Steps::default() };
         for step in 0..n_steps {
             self.begin_step();
             let normalised = self.normalisation.apply(&self.observation);
@@ -254,12 +255,16 @@ impl<const N: usize> Rollout for HostRollout<N> {
             steps.action.extend_from_slice(&actions);
             self.make(&actions)?;
             let batch = self.simulator.batch();
+            let ended = batch.ended.iter().map(|&code| Ended::from_code(code).unwrap_or(Ended::Running));
+            steps.ended.extend(ended);
             for env in 0..n_envs {
+                let is_late = late_fails && steps.ended[step * n_envs + env].truncated();
                 let lane = batch.terms[env].lane_distance * own.lane_distance_limit / weights.lane_distance_limit;
                 let terms = RewardTerms {
                     lane_distance: lane.min(1.0),
                     clearance: physics::closeness(&weights, &batch.clearance[env])
                         .powf(settings.clearance_power as f32),
+                    failure: if is_late { 1.0 } else { batch.terms[env].failure },
                     ..batch.terms[env]
                 };
                 let beside = batch.reward[env] - physics::rewarded(&own, &batch.terms[env]); // hindrance, aprons
@@ -270,7 +275,6 @@ impl<const N: usize> Rollout for HostRollout<N> {
                 add_arrivals(reward, &batch.ended, arrival as f32);
             }
             reward.iter_mut().for_each(|reward| *reward *= reward_scale as f32);
-            steps.ended.extend(batch.ended.iter().map(|&code| Ended::from_code(code).unwrap_or(Ended::Running)));
             let next = observed::<N>(&batch.next_observation, &batch.next_extras, &batch.next_around);
             for (env, next) in next.iter().enumerate() {
                 if steps.needs_next(step * n_envs + env, n_steps * n_envs) {

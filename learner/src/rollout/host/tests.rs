@@ -93,12 +93,16 @@ const REFINEMENT: &str = "refinement={begin=0.0, n_steps=1, epochs=1, batch=64, 
 
 /// Trucks of `traffic2026` among many vehicles, under the rule that yields, and the network of its shipped policy.
 fn under_a_rule(settings: &[&str]) -> (HostRollout<AMONG>, Mlp) {
+    let mut scenario = Scenario::named("traffic2026").unwrap();
+    scenario.retain(|_, route| route.name.starts_with("20m/N"));
+    in_scenario(&scenario, settings)
+}
+
+fn in_scenario(scenario: &Scenario, settings: &[&str]) -> (HostRollout<AMONG>, Mlp) {
     let settings: Vec<String> =
         ["n_envs=64", "rule=\"yields\""].iter().chain(settings).map(|&setting| setting.to_owned()).collect();
     let config = Config::read_with(Path::new("traffic"), &settings).unwrap();
-    let mut scenario = Scenario::named("traffic2026").unwrap();
-    scenario.retain(|_, route| route.name.starts_with("20m/N"));
-    let world = Arc::new(World::bake(&scenario).unwrap());
+    let world = Arc::new(World::bake(scenario).unwrap());
     let mut rollout = HostRollout::new(&config, &world, scenario.split(Split::Test).to_vec(), None).unwrap();
     let policy = Policy::shipped("traffic2026").unwrap();
     rollout.set_normalisation(&policy.normalisation);
@@ -135,6 +139,35 @@ fn under_a_rule_no_truck_drives_faster_than_it_allows_and_a_refinement_remembers
     }
     // A truck that wants to go while it must wait.
     assert!(64 < n_slowed, "{n_slowed}");
+}
+
+#[test]
+fn in_a_refinement_where_who_is_late_fails_the_end_of_time_is_rewarded_as_a_failure_and_has_no_value_after_it() {
+    let mut scenario = Scenario::named("traffic2026").unwrap();
+    scenario.retain(|_, route| route.name.starts_with("20m/N"));
+    // No time to wait for anybody.
+    scenario.time_limit = 1.0;
+    scenario.traffic.as_mut().unwrap().waiting = 0.0;
+    let late = REFINEMENT.replace("n_steps=1", "n_steps=300").replace("clear", "late_fails=true, clear");
+    let usual = late.replace("true", "false");
+    let [(late, n_late), (usual, n_usual)] = [late, usual].map(|settings| {
+        let (mut rollout, actor) = in_scenario(&scenario, &[&settings]);
+        let settings = rollout.config.refinement.clone().unwrap();
+        let steps = rollout.collect(&actor, &settings).unwrap();
+        let n_rows = steps.reward.len();
+        let n_next = (0..n_rows).filter(|&row| steps.needs_next(row, n_rows)).count();
+        assert_eq!(n_next * AMONG, steps.next_observation.len());
+        (steps, n_next)
+    });
+    let mut n_ended = 0;
+    for (row, ended) in late.ended.iter().enumerate() {
+        assert_eq!(*ended, usual.ended[row]);
+        let more = if *ended == Ended::TimedOut { -500.0 * 0.003 } else { 0.0 };
+        assert!((late.reward[row] - usual.reward[row] - more).abs() < 1e-4, "row {row}, {ended:?}");
+        n_ended += usize::from(*ended == Ended::TimedOut);
+    }
+    assert!(16 < n_ended, "{n_ended}");
+    assert_eq!(n_usual - n_late, n_ended);
 }
 
 #[test]
