@@ -52,6 +52,10 @@ pub struct Counts {
     pub delay: f64,
     /// Number of these cars.
     pub delayed: u64,
+    /// Sum of what those have lost so far who were not up to speed at the end (s).
+    pub delay_so_far: f64,
+    /// Number of these cars.
+    pub unfinished: u64,
     /// Number of steps with so many cars queued, by the number of cars.
     pub queues: Vec<u64>,
 }
@@ -66,6 +70,8 @@ impl Counts {
         self.circulating += other.circulating;
         self.delay += other.delay;
         self.delayed += other.delayed;
+        self.delay_so_far += other.delay_so_far;
+        self.unfinished += other.unfinished;
         self.queues.resize(self.queues.len().max(other.queues.len()), 0);
         self.queues.iter_mut().zip(&other.queues).for_each(|(sum, &steps)| *sum += steps);
     }
@@ -75,6 +81,14 @@ impl Counts {
     pub fn mean_delay(&self) -> Option<f64> {
         // Speeds of a car alone are rounded, so what nobody hinders may come to less than none.
         (0 < self.delayed).then(|| (self.delay / self.delayed as f64).max(0.0))
+    }
+
+    /// The least that the mean delay of all cars can be, those included that have not come up to speed yet (s): more
+    /// than [`Counts::mean_delay`] where the lane stands. None where nobody came.
+    pub fn least_mean_delay(&self) -> Option<f64> {
+        let n = self.delayed + self.unfinished;
+        let of_all = (0 < n).then(|| (self.delay + self.delay_so_far) / n as f64);
+        of_all.map(|of_all| of_all.max(self.mean_delay().unwrap_or(0.0)))
     }
 
     /// Whether more came than the lane could serve.
@@ -137,6 +151,7 @@ impl<'a> Survey<'a> {
             run.step(|event, _| events.push(event));
             observer.observe(&run, &before, &events, step);
         }
+        observer.count_unfinished(&run, WARM_UP + steps);
         observer.counts
     }
 
@@ -258,5 +273,23 @@ impl<'a> Observer<'a> {
             }
         }
         self.counts.iter_mut().zip(queued).for_each(|(counts, n)| counts.note_queue(n));
+    }
+
+    /// Counts who waits outside or is on an entry after the last step, `end`.
+    fn count_unfinished(&mut self, run: &Run, end: u32) {
+        let mut add = |source: usize, steps: u32| {
+            self.counts[source].unfinished += 1;
+            self.counts[source].delay_so_far += f64::from(STEP) * f64::from(steps);
+        };
+        for (source, outside) in self.outside.iter().enumerate() {
+            outside.iter().for_each(|came| add(source, end - came));
+        }
+        for (car, known) in run.cars.iter().zip(self.known).filter(|(car, _)| car.is_there()) {
+            if let Some(Known { came, free }) = known
+                && car.front() <= self.survey.end_of_entry(car.path())
+            {
+                add(self.survey.network.paths[car.path()].source as usize, (end - came).saturating_sub(free));
+            }
+        }
     }
 }

@@ -101,22 +101,19 @@ fn found(args: &Args, place: &Place, mix: Mix, bar: &Bar) -> Result<Found, Error
             Manual { lanes: kind.name(place.road.is_mirrored()), capacity, delay, level, queue_95 }
         });
         let (delay, queue_95) = (counts.mean_delay(), counts.queue_95());
-        let level = match delay {
-            None => counts.is_over_capacity().then_some('F'),
-            Some(delay) => Some(level_of_lane(delay, counts.is_over_capacity())),
-        };
+        // Who still stands at the end has no delay yet, but has waited.
+        let level = counts.least_mean_delay().map(|delay| level_of_lane(delay, counts.is_over_capacity()));
         Entry { arm, lane, demand, served, circulating, delay, level, queue_95, hcm }
     };
     let mut all = Counts::default();
     sums.iter().for_each(|counts| all.add(counts));
-    let delay = all.mean_delay();
     Ok(Found {
         road: place.road.name.clone(),
         runs: args.runs,
         minutes: args.minutes,
         entries: sums.iter().enumerate().map(entry).collect(),
-        delay,
-        level: delay.map(level_of_service),
+        delay: all.mean_delay(),
+        level: all.least_mean_delay().map(level_of_service),
         demand: total,
         served: all.served as f64 / hours,
         stayed: all.stayed as f64 / all.came.max(1) as f64,

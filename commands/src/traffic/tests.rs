@@ -62,6 +62,17 @@ fn a_lane_to_which_more_come_than_it_serves_is_at_level_f_and_one_to_which_nobod
 }
 
 #[test]
+fn a_lane_that_stands_is_at_level_f_before_anybody_stays_away() {
+    let jammed = ["--demand", "3000", "--share", "tractor_trailers=0.3", "--share", "buses=0.3"];
+    let found = json(&[&["20m", "--minutes", "2", "--runs", "1", "--seed", "0"], &jammed[..]].concat());
+    let entries = found[0]["entries"].as_array().unwrap();
+    let stands = |entry: &&Value| entry["served"] == 0.0 && 10 < entry["queue_95"].as_u64().unwrap();
+    let standing: Vec<&Value> = entries.iter().filter(stands).collect();
+    assert!(standing.iter().any(|entry| entry["delay"].is_null()), "{entries:?}");
+    assert!(standing.iter().all(|entry| entry["level"] == "F") && found[0]["level"] == "F", "{found}");
+}
+
+#[test]
 fn the_manuals_capacity_is_less_where_heavy_vehicles_are() {
     let of = |shares: &[&str]| {
         let words = [&["20m", "--capacity", "--minutes", "1", "--runs", "1"], shares].concat();
