@@ -190,6 +190,32 @@ fn an_apron_is_a_border_of_the_map_that_trucks_have_access_to_and_is_read_back_w
         // One that covers the whole island, as in the middle of a mini-roundabout: half a metre stays solid.
         let covers = ground(&text.replace("a=\"2.000000000\"", &format!("a=\"{:.9}\"", road.island_radius() - 1e-3)));
         assert_eq!(covers.ground.aprons, [Curve::circle(DVec2::ZERO, 0.5)], "{:?}", covers.warnings);
+        // A seam in its middle is not an island; what stands there is.
+        for (rest, core) in [(0.03, 0.5), (0.3, 0.5), (0.7, 0.7)] {
+            let width = format!("a=\"{:.9}\"", road.island_radius() - rest);
+            let found = ground(&text.replace("a=\"2.000000000\"", &width));
+            let [apron] = &found.ground.aprons[..] else { panic!("{rest}: {:?}", found.warnings) };
+            assert!(apron.polyline(0.01).iter().all(|p| (p.length() - core).abs() < LOST), "{rest}");
+        }
+        let corners: String = (0..24)
+            .map(|corner| 3.0 * DVec2::from_angle(TAU * f64::from(corner) / 24.0))
+            .map(|p| format!("<cornerLocal u=\"{}\" v=\"{}\" z=\"0\"/>", p.x, p.y))
+            .collect();
+        let width = format!("a=\"{:.9}\"", road.island_radius() - 1e-3);
+        let with = text.replace("a=\"2.000000000\"", &width);
+        let (before, after) = with.split_at(with.find(&width).unwrap());
+        // At the centre, on the side of the island's edge on which the apron is.
+        let lane = &before[before.rfind("<lane id=\"").unwrap()..];
+        let t = if lane.starts_with("<lane id=\"-") { -road.island_radius() } else { road.island_radius() };
+        let monument = format!(
+            "</lanes><objects><object id=\"1\" type=\"trafficIsland\" s=\"0\" t=\"{t}\" hdg=\"0\"><outlines><outline>\
+             {corners}</outline></outlines></object></objects>",
+        );
+        let found = ground(&format!("{before}{}", after.replacen("</lanes>", &monument, 1)));
+        let [apron] = &found.ground.aprons[..] else { panic!("{:?}", found.warnings) };
+        for p in apron.polyline(0.01) {
+            assert!((p.length() - 3.0).abs() < 0.05, "{p}");
+        }
     }
 }
 

@@ -17,7 +17,7 @@ use super::surroundings::{self, Part, REACH, clipped, encloses_origin, outline};
 use super::whole::TILTED;
 use super::{FINEST, Map, Ring};
 use crate::files::reader::{Error, Reader};
-use crate::geometry::area::{densified, points, signed_area};
+use crate::geometry::area::{Area, counter_clockwise, densified, points, signed_area};
 use crate::geometry::{Curve, Outline, Piece};
 use crate::map::apron;
 use crate::map::ground::{Arm, Edges, Ground, Kerb};
@@ -197,12 +197,14 @@ fn island(map: &Map, ring: &Ring, extent: f64) -> Option<Island> {
     let edges = clipped(&surface.edges, extent).into_iter().find(around)?;
     let island = faces.iter().skip(1).find(|hole| encloses_origin(hole))?;
     let (centre, radius, _) = fitted_circle(&densified(&points(island), 0.1))?;
-    // Where it leads all around, what is within it is a hole; one that covers the island has none.
+    // Where it leads all around, what is within it is a hole; one that covers the island has none, or a seam.
     let aprons = clipped(&surface.aprons, OVAL * radius);
-    let hole = aprons.iter().flat_map(|part| part.iter().skip(1)).find(|hole| encloses_origin(hole));
-    let covers = hole.is_none() && aprons.iter().any(|part| encloses_origin(&part[0]));
-    let inner = hole.and_then(|hole| outline(&vec![hole.clone()], centre).loops.pop());
-    let apron = inner.or_else(|| covers.then(|| Curve::circle(DVec2::ZERO, CORE)));
+    let around_it = aprons.iter().find(|part| encloses_origin(&part[0]));
+    let hole = around_it.and_then(|part| part.iter().skip(1).find(|hole| encloses_origin(hole)));
+    let core = |hole: &Vec<[f64; 2]>| Area::union([counter_clockwise(points(hole))].into_iter()).grown(-CORE);
+    let covers = around_it.is_some_and(|part| part.iter().skip(1).all(|hole| core(hole).parts.is_empty()));
+    let inner = || outline(&vec![hole?.clone()], centre).loops.pop();
+    let apron = if covers { Some(Curve::circle(DVec2::ZERO, CORE)) } else { inner() };
     Some(Island {
         has_open_apron: !aprons.is_empty() && apron.is_none(),
         apron,

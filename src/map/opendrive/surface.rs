@@ -64,7 +64,8 @@ impl Surface {
         let lane_edge = Edge::new(&lanes);
         let beside_lanes = Area { parts: voids.parts.iter().filter(|void| lane_edge.touches(void)).cloned().collect() };
         let bounded = |area: Area| area.closed(GAP).minus(&kerbs).minus(&solid).without_slits(SLIT, SIMPLE);
-        let aprons = kind(Kind::Apron).closed(GAP);
+        // What stands on an apron is solid.
+        let aprons = kind(Kind::Apron).closed(GAP).minus(&kerbs);
         Surface { edges: bounded(lanes.plus(&beside_lanes)), faces: bounded(paved.plus(&voids)), aprons }
     }
 }
