@@ -27,10 +27,13 @@ pub fn distinct(written: &[Named], read: &[Named]) -> Result<(), Error> {
     let named: Vec<Named> = named.iter().map(|(flag, file)| (*flag, Some(file.as_path()))).collect();
     for (index, (flag, file)) in written.iter().enumerate() {
         let Some(file) = file else { continue };
-        let others = written[..index].iter().chain(read).chain(&named);
-        if let Some((other, _)) = others.into_iter().find(|(_, other)| other.is_some_and(|other| is_same(file, other)))
-        {
-            let expected = format!("is the file of {other} too: name another one");
+        let same = |others: &[Named]| {
+            others.iter().find(|(_, other)| other.is_some_and(|other| is_same(file, other))).map(|(other, _)| *other)
+        };
+        let own = || same(&written[..index]).or_else(|| same(read)).map(|other| format!("is the file of {other} too"));
+        let found = own().or_else(|| same(&named).map(|other| format!("is named in the file of {other}")));
+        if let Some(found) = found {
+            let expected = format!("{found}: name another one");
             return Err(Error::Setting { name: flag, value: file.display().to_string(), expected });
         }
     }
@@ -39,8 +42,9 @@ pub fn distinct(written: &[Named], read: &[Named]) -> Result<(), Error> {
 
 /// Tells of the files whose paths stand as texts in a TOML file, and in those.
 fn add_named(file: &Path, depth: usize, tell: &mut impl FnMut(PathBuf)) {
-    let is_toml = 0 < depth && file.extension().is_some_and(|extension| extension == "toml");
-    let text = is_toml.then(|| read_text(file, TEXT_LIMIT).ok()).flatten();
+    // Whatever its ending: a pipe would be read empty.
+    let may_name = 0 < depth && file.is_file();
+    let text = may_name.then(|| read_text(file, TEXT_LIMIT).ok()).flatten();
     let mut values: Vec<Value> =
         text.and_then(|text| text.parse::<toml::Table>().ok()).map(Value::Table).into_iter().collect();
     while let Some(value) = values.pop() {

@@ -66,10 +66,17 @@ fn no_output_replaces_what_the_command_reads_under_another_name() {
     let benchmark = place.text("benchmark.toml");
     let text = std::fs::read_to_string(repository().join("scenarios/attard2023.toml")).unwrap();
     std::fs::write(&benchmark, text.replace("vehicles/daf_xf.toml", "truck.toml")).unwrap();
+    // Whatever the benchmark's ending.
+    let other = place.text("benchmark.bench");
+    std::fs::copy(&benchmark, &other).unwrap();
     let truck = place.text("truck.toml");
     std::fs::copy(repository().join("scenarios/vehicles/daf_xf.toml"), &truck).unwrap();
-    let cases: [(&[&str], &str); 8] = [
-        (&["evaluate", "--benchmark", &benchmark, "--json", &truck], "--json: {}; is the file of --benchmark too"),
+    let cases: [(&[&str], &str); 9] = [
+        (
+            &["evaluate", "--benchmark", &benchmark, "--json", &truck],
+            "--json: {}; is named in the file of --benchmark: ",
+        ),
+        (&["evaluate", "--benchmark", &other, "--json", &truck], "--json: {}; is named in the file of --benchmark: "),
         (&["traffic", &own, "--json", &own], "--json: {}; is the file of ROAD too"),
         (&["scale", "--benchmark", &own, "--envs", "8", "--json", &own], "--json: {}; is the file of --benchmark too"),
         (&["evaluate", "--policy", &yields, "--json", &policy], "--json: {}; is the file of --policy too"),
