@@ -81,7 +81,13 @@ pub fn run(args: &Args) -> Result<(), Error> {
 /// Drives a certificate's sequences again.
 fn again(path: &Path, benchmark: Option<&str>, load: Option<&str>) -> Result<(), Error> {
     let certificate = Certificate::read(path)?;
-    let scenario = roads::benchmark(benchmark.unwrap_or(&certificate.benchmark))?;
+    let own = || {
+        roads::benchmark(&certificate.benchmark).map_err(|error| {
+            let what = "is the benchmark's path from where the certificate was made; --benchmark says where it is now";
+            Error::contents(path, format!("benchmark: {error}: {what}"))
+        })
+    };
+    let scenario = benchmark.map_or_else(own, roads::benchmark)?;
     let mut scenario = roads::with_load(scenario, load)?;
     // Random roads that the benchmark does not have are drawn again.
     let is_random = |name: &String| name.rsplit_once('/').is_some_and(|(road, _)| procedural::address(road).is_some());

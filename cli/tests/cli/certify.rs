@@ -212,6 +212,11 @@ fn a_policy_may_be_among_the_candidates_and_must_fit_the_benchmark() {
     assert_eq!(certificate["routes"].as_array().map(Vec::len), Some(1));
     // It says where its benchmark is, a file of one's own.
     succeed(&offtrack(&["certify", "--verify", &place.text("c.json")]));
+    let moved = place.text("moved.toml");
+    std::fs::rename(&benchmark, &moved).unwrap();
+    let said = refusal(&offtrack(&["certify", "--verify", &place.text("c.json")]), 2);
+    assert!(said.contains("c.json: benchmark: ") && said.contains("--benchmark says where it is now"), "{said}");
+    succeed(&offtrack(&["certify", "--verify", &place.text("c.json"), "--benchmark", &moved]));
     assert!(refusal(&certify("attard2023"), 2).contains("another action table"));
 }
 
