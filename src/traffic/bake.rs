@@ -108,8 +108,9 @@ pub(super) fn met(fine: &[Points], outer_radius: f64) -> Vec<Vec<Meeting>> {
                 let angle = fine[a].angle(at_a, &fine[b], at_b);
                 let joins = angle < PARALLEL || JOINED <= part.n_same;
                 let kind = if joins || angle < SHALLOW { Kind::Follow } else { Kind::Cross };
-                let is_oncoming =
-                    outer_radius < fine[a].point(at_a).length() && fine[a].is_opposite(at_a, &fine[b], at_b);
+                let are_outside =
+                    [fine[a].point(at_a), fine[b].point(at_b)].iter().all(|point| outer_radius < point.length());
+                let is_oncoming = are_outside && fine[a].is_opposite(at_a, &fine[b], at_b);
                 Meeting { a: metres(part.a), b: metres(part.b), delta: part.delta(), kind, joins, is_oncoming }
             };
             if a != b {

@@ -7,7 +7,7 @@ use crate::files::cache::Cache;
 use crate::map::Road;
 
 /// Counted up whenever the same lines give other tables, so that older entries are not used.
-const FORM: u32 = 3;
+const FORM: u32 = 4;
 
 impl Network {
     /// What [`Network::bake`] gives, [with large vehicles](Network::with_large) if there are some, from the cache if it

@@ -70,7 +70,9 @@ fn the_lines_of_every_road_are_at_its_ring_and_not_where_both_lanes_of_an_arm_ar
 
 #[test]
 fn what_one_path_meets_of_another_is_what_that_meets_of_the_first() {
-    for network in [baked("20m"), Network::bake(&map("town03")).unwrap()] {
+    // The last one has an arm whose lanes lie near each other.
+    let narrow = procedural::find("wide/2026/256").unwrap();
+    for network in [baked("20m"), Network::bake(&map("town03")).unwrap(), Network::bake(&narrow).unwrap()] {
         let n = network.paths.len();
         for (a, b) in (0..n).flat_map(|a| (0..n).map(move |b| (a, b))) {
             let hard = |a: usize, b: usize| {
