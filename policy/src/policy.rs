@@ -21,7 +21,7 @@ const FILE_LIMIT: u64 = 64 << 20;
 
 /// The policies that come with the project, by name. One with a benchmark's name drives there unless another is asked
 /// for.
-const SHIPPED: [(&str, &[u8]); 7] = [
+const SHIPPED: [(&str, &[u8]); 8] = [
     ("attard2023", include_bytes!("../shipped/attard2023/policy.safetensors")),
     ("attard2023-lane", include_bytes!("../shipped/attard2023-lane/policy.safetensors")),
     ("attard2023-as-run", include_bytes!("../shipped/attard2023-as-run/policy.safetensors")),
@@ -29,6 +29,7 @@ const SHIPPED: [(&str, &[u8]); 7] = [
     ("laden2026-50", include_bytes!("../shipped/laden2026-50/policy.safetensors")),
     ("transfer2026", include_bytes!("../shipped/transfer2026/policy.safetensors")),
     ("traffic2026", include_bytes!("../shipped/traffic2026/policy.safetensors")),
+    ("traffic2026-laden", include_bytes!("../shipped/traffic2026-laden/policy.safetensors")),
 ];
 
 /// How a policy chooses among its actions.
