@@ -57,6 +57,20 @@ def kept(figures, keys):
     return {key: figures[key] for key in keys if key in figures}
 
 
+def rounded(figures):
+    """Figures to five decimals."""
+    if isinstance(figures, dict):
+        return {key: rounded(value) for key, value in figures.items()}
+    if isinstance(figures, list):
+        return [rounded(value) for value in figures]
+    return round(figures, 5) if isinstance(figures, float) else figures
+
+
+def write(file, result):
+    """Writes the file, a figure a line: there are many."""
+    write_json(file, rounded(result), indent=0)
+
+
 def driven(offtrack, policy, benchmark, episodes):
     """The report of a policy on the test routes of a benchmark."""
     certify = ["--certify", "--widths", "64"] if benchmark in CERTIFIED and policy in SEARCHED else []
@@ -107,7 +121,7 @@ def main():
             report = driven(args.offtrack, name, benchmark, BENCHMARKS[benchmark])
             rows[benchmark] = row(name, benchmark, report)
             result |= {"commit": report["commit"], "machine": report["machine"]}
-            write_json(args.json, {**result, **policies})
+            write(args.json, {**result, **policies})
     if args.benchmarks or not shipped:
         return
     benchmark, polite, episodes = POLITE
@@ -123,7 +137,7 @@ def main():
         file.flush()
         for name, rows in policies.items():
             rows["empty"] = row(name, "empty", driven(args.offtrack, name, file.name, episodes))
-    write_json(args.json, {**result, **policies})
+    write(args.json, {**result, **policies})
 
 
 if __name__ == "__main__":

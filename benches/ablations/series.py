@@ -86,10 +86,10 @@ def evaluation(offtrack, *flags):
         return json.loads(file.read_text())
 
 
-def write_json(file, whole):
+def write_json(file, whole, indent=1):
     """Writes a file, whole or not at all."""
     temporary = file.with_suffix(".tmp")
-    temporary.write_text(json.dumps(whole, indent=1) + "\n")
+    temporary.write_text(json.dumps(whole, indent=indent) + "\n")
     temporary.replace(file)
 
 
