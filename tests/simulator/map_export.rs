@@ -207,11 +207,16 @@ fn an_apron_is_a_border_of_the_map_that_trucks_have_access_to_and_is_read_back_w
         // At the centre, on the side of the island's edge on which the apron is.
         let lane = &before[before.rfind("<lane id=\"").unwrap()..];
         let t = if lane.starts_with("<lane id=\"-") { -road.island_radius() } else { road.island_radius() };
-        let monument = format!(
-            "</lanes><objects><object id=\"1\" type=\"trafficIsland\" s=\"0\" t=\"{t}\" hdg=\"0\"><outlines><outline>\
-             {corners}</outline></outlines></object></objects>",
-        );
-        let found = ground(&format!("{before}{}", after.replacen("</lanes>", &monument, 1)));
+        let with_monument = |t: f64| {
+            let monument = format!(
+                "</lanes><objects><object id=\"1\" type=\"trafficIsland\" s=\"0\" t=\"{t}\" hdg=\"0\"><outlines>\
+                 <outline>{corners}</outline></outlines></object></objects>",
+            );
+            ground(&format!("{before}{}", after.replacen("</lanes>", &monument, 1)))
+        };
+        let beside = with_monument(t / 2.0);
+        assert!(beside.ground.aprons.is_empty() && beside.warnings.iter().any(|warning| warning.contains("obstacles")));
+        let found = with_monument(t);
         let [apron] = &found.ground.aprons[..] else { panic!("{:?}", found.warnings) };
         for p in apron.polyline(0.01) {
             assert!((p.length() - 3.0).abs() < 0.05, "{p}");

@@ -72,7 +72,7 @@ struct Island {
     edges: Outline,
     /// The inner edge of its apron.
     apron: Option<Curve>,
-    /// Whether the map has an apron that does not lead all around the island.
+    /// Whether the map has an apron that does not lead all around the island, or on which something stands.
     has_open_apron: bool,
 }
 
@@ -110,9 +110,10 @@ pub(super) fn ground(map: &Map, ring: &Ring, options: &Options) -> Result<Import
     let drawn = apron.into_iter().map(|apron| ("apron".to_owned(), apron)).collect();
     let checked = apron::checked(&refused.reader, &imported.ground.faces, drawn);
     if has_open_apron || checked.is_err() {
-        imported
-            .warnings
-            .push(format!("{}: its apron does not lead all around the island; it is solid", refused.place));
+        imported.warnings.push(format!(
+            "{}: its apron does not lead all around the island free of obstacles; it is solid",
+            refused.place
+        ));
     }
     let aprons = checked.unwrap_or_default();
     imported.ground = Ground { island_radius: radius, outer_radius, lane_radii, aprons, ..imported.ground };
@@ -199,11 +200,15 @@ fn island(map: &Map, ring: &Ring, extent: f64) -> Option<Island> {
     let (centre, radius, _) = fitted_circle(&densified(&points(island), 0.1))?;
     // Where it leads all around, what is within it is a hole; one that covers the island has none, or a seam.
     let aprons = clipped(&surface.aprons, OVAL * radius);
-    let around_it = aprons.iter().find(|part| encloses_origin(&part[0]));
-    let hole = around_it.and_then(|part| part.iter().skip(1).find(|hole| encloses_origin(hole)));
-    let core = |hole: &Vec<[f64; 2]>| Area::union([counter_clockwise(points(hole))].into_iter()).grown(-CORE);
-    let covers = around_it.is_some_and(|part| part.iter().skip(1).all(|hole| core(hole).parts.is_empty()));
-    let inner = || outline(&vec![hole?.clone()], centre).loops.pop();
+    let around_it: Vec<&Part> = aprons.iter().filter(|part| encloses_origin(&part[0])).collect();
+    let core = |hole: &[[f64; 2]]| Area::union([counter_clockwise(points(hole))].into_iter()).grown(-CORE);
+    let solid: Vec<_> =
+        around_it.iter().flat_map(|part| &part[1..]).filter(|hole| !core(hole).parts.is_empty()).collect();
+    // Of several, one within the other, the outermost: what lies between them is solid. Beside it nothing may be.
+    let outermost = solid.iter().max_by(|a, b| signed_area(a).abs().total_cmp(&signed_area(b).abs()));
+    let hole = outermost.filter(|_| solid.iter().all(|hole| encloses_origin(hole)));
+    let covers = !around_it.is_empty() && solid.is_empty();
+    let inner = || outline(&vec![(*hole?).clone()], centre).loops.pop();
     let apron = if covers { Some(Curve::circle(DVec2::ZERO, CORE)) } else { inner() };
     Some(Island {
         has_open_apron: !aprons.is_empty() && apron.is_none(),
