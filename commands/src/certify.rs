@@ -83,8 +83,8 @@ fn again(path: &Path, benchmark: Option<&str>, load: Option<&str>) -> Result<(),
     let certificate = Certificate::read(path)?;
     let own = || {
         roads::benchmark(&certificate.benchmark).map_err(|error| {
-            let what = "is the benchmark's path from where the certificate was made; --benchmark says where it is now";
-            Error::contents(path, format!("benchmark: {error}: {what}"))
+            let what = "the path is from where the certificate was made; --benchmark says where it is now";
+            Error::contents(path, format!("benchmark: {error}; {what}"))
         })
     };
     let scenario = benchmark.map_or_else(own, roads::benchmark)?;
