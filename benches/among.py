@@ -19,7 +19,7 @@ import shlex
 import tempfile
 from pathlib import Path
 
-from ablations.series import evaluation, write_json
+from ablations.series import evaluation, rounded, write_json
 
 ROOT = Path(__file__).resolve().parents[1]
 POLICIES = ["yields:traffic2026", "traffic2026", "yields", "follows"]
@@ -55,15 +55,6 @@ AMONG_BY_DEMAND = ["standing_mean", "blocked", "braking_mean", "lane_classes"]
 
 def kept(figures, keys):
     return {key: figures[key] for key in keys if key in figures}
-
-
-def rounded(figures):
-    """Figures to five decimals."""
-    if isinstance(figures, dict):
-        return {key: rounded(value) for key, value in figures.items()}
-    if isinstance(figures, list):
-        return [rounded(value) for value in figures]
-    return round(figures, 5) if isinstance(figures, float) else figures
 
 
 def write(file, result):

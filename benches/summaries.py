@@ -17,6 +17,8 @@ import sys
 import tarfile
 from pathlib import Path
 
+from ablations.series import rounded
+
 ROOT = Path(__file__).resolve().parents[1]
 DATA = ROOT / "docs/data"
 RESULTS = ROOT / "docs/results"
@@ -51,10 +53,6 @@ class Archive:
             del found["commit"]
             found["reported_in"] = sorted(REPORTED[name] for name in REPORTED if self.members.get(name) in reports)
         return {"commands": commands, "date": date, **found, "archive": self.path.relative_to(ROOT).as_posix()}
-
-
-def rounded(value):
-    return None if value is None else round(value, 5)
 
 
 def brief(report):

@@ -86,6 +86,15 @@ def evaluation(offtrack, *flags):
         return json.loads(file.read_text())
 
 
+def rounded(figures):
+    """Figures to five decimals."""
+    if isinstance(figures, dict):
+        return {key: rounded(value) for key, value in figures.items()}
+    if isinstance(figures, list):
+        return [rounded(value) for value in figures]
+    return round(figures, 5) if isinstance(figures, float) else figures
+
+
 def write_json(file, whole, indent=1):
     """Writes a file, whole or not at all."""
     temporary = file.with_suffix(".tmp")
