@@ -25,9 +25,11 @@ fn count_step(local: u32, env: u32) {
     workgroupBarrier();
     if is_driving(env) {
         atomicAdd(&counted[ended[env]], 1);
-        let units = i32(round(reward[env] * REWARD_UNITS));
-        atomicAdd(&counted[REWARD_SUM], units & 0xffff);
-        atomicAdd(&counted[N_SUMS], units >> 16u);
+        // Halves of a number that may be larger than an i32: both are exact.
+        let units = round(reward[env] * REWARD_UNITS);
+        let upper = floor(units * (1.0 / 65536.0));
+        atomicAdd(&counted[REWARD_SUM], i32(units - 65536.0 * upper));
+        atomicAdd(&counted[N_SUMS], i32(upper));
     }
     workgroupBarrier();
     if local < N_SUMS {

@@ -161,7 +161,7 @@ impl Simulator {
 
     /// Begins an episode of each of these trucks and leaves the others as they are. What follows depends on the truck's
     /// stream alone: with the stream (seed, env) it drives as truck `env` of a batch with that seed, at any place in a
-    /// batch of any size. Wrong requests leave the batch as it was.
+    /// batch of any size. Wrong requests, as two for one truck, leave the batch as it was.
     pub fn begin(&mut self, requests: &[Begin]) -> Result<(), Error> {
         let n_envs = self.n_envs();
         let mut begins = vec![BeginRow::default(); n_envs];
@@ -171,6 +171,9 @@ impl Simulator {
             let Some(begin) = begins.get_mut(env) else {
                 return Err(Error::UnknownTruck { position, index: env, n_envs });
             };
+            if begin.what != 0 {
+                return Err(Error::RepeatedTruck { position, index: env });
+            }
             route.map_or(Ok(()), |route| check_known(&self.world, &[route]))?;
             start.map_or(Ok(()), |start| check_start(&self.world, env, &start))?;
             let flag = |is_set: bool, bit: u32| if is_set { bit } else { 0 };

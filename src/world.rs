@@ -171,7 +171,8 @@ impl World {
         let vehicles = size_of_val(self.rigs.as_slice()) + size_of_val(self.rays.as_slice());
         let shared = size_of_val(&self.params) + size_of_val(&self.reward) + size_of_val(&self.disturbances);
         let shared = shared + size_of_val(self.actions.as_slice());
-        self.all_fields().map(Field::bytes).sum::<usize>() + routes + vehicles + shared
+        let traffic = self.traffic.iter().flat_map(Traffic::words).map(|words| size_of_val(words.as_slice()));
+        self.all_fields().map(Field::bytes).sum::<usize>() + routes + vehicles + shared + traffic.sum::<usize>()
     }
 
     /// Whether an action is a command, and no index into the action table: the table then has two entries, what

@@ -13,8 +13,8 @@ const F32: u128 = 4;
 const COPIES: u128 = 33;
 /// Copies of the parameters of the refinement's two networks, counted as in [`COPIES`].
 const REFINED_COPIES: u128 = 24;
-/// Bytes of a truck beside its observations: its row of the batch.
-const TRUCK: u128 = 1_000;
+/// Bytes of a truck beside its observations: its row of the batch, among other vehicles.
+const TRUCK: u128 = 1_800;
 
 /// A part of the memory, and the key that it grows with.
 struct Part {

@@ -173,7 +173,11 @@ impl Training {
     /// training's with any seed.
     fn run(&self, config: &Config, prepared: Prepared, opened: Opened, caller: Caller) -> Result<Outcome, Error> {
         let Prepared { backend, session, validation } = prepared;
-        let Opened { folder, metrics, stored, has_new_budget } = opened;
+        let Opened { folder, mut metrics, stored, has_new_budget } = opened;
+        if stored.is_none() {
+            // It starts from the beginning: rows that were written before the first checkpoint come again.
+            metrics.clear()?;
+        }
         let Worlds { training, training_world, .. } = &self.worlds;
         let progress = Progress::new(config, metrics, Box::new(caller));
         let counts = RouteCounts::new(training, folder.routes());

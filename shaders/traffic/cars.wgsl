@@ -312,7 +312,12 @@ fn outline_of(network: Network, car: Car) -> Outline {
     let station = station_of(car);
     let front = point_at(network, path_of(car), station - OVERHANG * length);
     let rear = point_at(network, path_of(car), station - (1.0 - OVERHANG) * length);
-    return Outline(0.5 * (front + rear), normalize(front - rear), 0.5 * length, half_width_of(car));
+    return Outline(0.5 * (front + rear), unit_or_zero(front - rear), 0.5 * length, half_width_of(car));
+}
+
+// A vector's direction; of none, as between two axles before the beginning of a path, zero.
+fn unit_or_zero(vector: vec2<f32>) -> vec2<f32> {
+    return select(vec2<f32>(), normalize(vector), any(vector != vec2<f32>()));
 }
 
 // Direction at a station of a path: linear between samples.

@@ -125,18 +125,20 @@ fn decided(env: u32, slot: u32, car: Car) -> u32 {
             consider(&driver, zone_at(pair.y + ZONE_WORDS * (first + z)), weighed);
         }
     }
-    // The row's own truck is the last: what is minded before is minded without it too.
-    var without = 0;
+    // The same car, if the row's own truck were not there. All rows of a group mind its trucks in one order: of two
+    // that are equally far along, the first is followed.
+    var without = driver;
     let first = first_of_group(env);
-    for (var n = 1u; n <= batch.group; n++) {
-        let mate = first + (env - first + n) % batch.group;
-        if mate == env { without = driver.interaction; }
+    for (var mate = first; mate < first + batch.group; mate++) {
         if !is_driving(mate) { continue; }
         let view = view_of(mate, network);
         mind_at_line(&driver, view);
         mind_in_corridor(&driver, view, car);
+        if mate == env { continue; }
+        mind_at_line(&without, view);
+        mind_in_corridor(&without, view, car);
     }
-    let slows_for_truck = without < driver.interaction;
+    let slows_for_truck = without.interaction < driver.interaction;
     keep_crossed_lanes_clear(&driver);
     if me.waits && driver.stops { stop_before(&driver, me.line - me.station); }
     // Half a step ahead: a speed's unit is the way of half a step.

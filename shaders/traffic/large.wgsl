@@ -17,7 +17,7 @@ fn first_of_large(network: Network, car: Car) -> Outline {
     // Both axles of a tractor follow the same line.
     let front = trail_at(network, car, TRACTOR_FRONT_AXLE).point;
     let rear = trail_at(network, car, TRACTOR_DRIVE_AXLE).point;
-    let along = normalize(front - rear);
+    let along = unit_or_zero(front - rear);
     let half_length = 0.5 * TRACTOR_LENGTH;
     return Outline(front + (TRACTOR_FRONT_AXLE - half_length) * along, along, half_length, half_width_of(car));
 }

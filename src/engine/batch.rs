@@ -160,9 +160,11 @@ macro_rules! batch {
                 group: usize,
             ) -> Result<Batch, Error> {
                 check_fits(n_envs, has_vehicles)?;
-                let mut streams: Vec<Stream> = zeros(n_envs)?;
+                // The system may refuse although it said that so much was free.
+                let refused = || too_large(n_envs, has_vehicles, 0);
+                let mut streams: Vec<Stream> = zeros(n_envs).ok_or_else(refused)?;
                 (0..).zip(&mut streams).for_each(|(env, stream)| *stream = Stream { seed, env });
-                let order = Order::new(zeros(n_envs)?, group);
+                let order = Order::new(zeros(n_envs).ok_or_else(refused)?, group);
                 Ok(Batch {
                     seed,
                     autoreset: choice.autoreset(),
@@ -172,8 +174,8 @@ macro_rules! batch {
                     tally: Tally::default(),
                     has_vehicles,
                     group,
-                    $($name: zeros(n_envs)?,)*
-                    $($name_of: zeros(Column::$variant_of.n_rows(n_envs, has_vehicles))?,)*
+                    $($name: zeros(n_envs).ok_or_else(refused)?,)*
+                    $($name_of: zeros(Column::$variant_of.n_rows(n_envs, has_vehicles)).ok_or_else(refused)?,)*
                 })
             }
 
@@ -316,19 +318,16 @@ pub fn check_size(n_envs: usize) -> Result<(), Error> {
 }
 
 fn check_fits(n_envs: usize, has_vehicles: bool) -> Result<(), Error> {
-    let width = row_bytes(has_vehicles);
     let available = memory::available().unwrap_or(u64::MAX);
-    let fitting = (available / width as u64).min(u32::MAX.into());
-    if n_envs as u64 <= fitting {
-        Ok(())
-    } else {
-        Err(Error::BatchTooLarge { n_envs, n_bytes: n_envs as u128 * width as u128, fitting })
-    }
+    let fitting = (available / row_bytes(has_vehicles) as u64).min(u32::MAX.into());
+    if n_envs as u64 <= fitting { Ok(()) } else { Err(too_large(n_envs, has_vehicles, fitting)) }
+}
+
+fn too_large(n_envs: usize, has_vehicles: bool, fitting: u64) -> Error {
+    Error::BatchTooLarge { n_envs, n_bytes: n_envs as u128 * row_bytes(has_vehicles) as u128, fitting }
 }
 
 /// A column of zeros, whose memory is taken page by page when it is first written to.
-fn zeros<T: bytemuck::Zeroable>(n_envs: usize) -> Result<Vec<T>, Error> {
-    // The system refuses although it said that so much was free.
-    let refused = |()| Error::BatchTooLarge { n_envs, n_bytes: n_envs as u128 * row_bytes(false) as u128, fitting: 0 };
-    bytemuck::allocation::try_zeroed_vec(n_envs).map_err(refused)
+fn zeros<T: bytemuck::Zeroable>(n_rows: usize) -> Option<Vec<T>> {
+    bytemuck::allocation::try_zeroed_vec(n_rows).ok()
 }

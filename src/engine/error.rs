@@ -144,6 +144,14 @@ pub enum Error {
         /// Trucks in the batch.
         n_envs: usize,
     },
+    /// A truck that begins twice at once.
+    #[error("indices[{position}]: {index} again; each truck may be named once")]
+    RepeatedTruck {
+        /// Position at which it is named again.
+        position: usize,
+        /// Its index.
+        index: usize,
+    },
     /// Actions must be one for each truck.
     #[error("actions: {n_actions} for {n_envs} trucks; one each is needed")]
     ActionCount {

@@ -38,7 +38,8 @@ constants! {
     const DRAW_ACTION: u32 = Draw::Action as u32;
 }
 
-/// What a number is drawn for: each has its own stream.
+/// What a number is drawn for: each has its own stream. Outside a batch a learner's generators and a table of vehicles
+/// begin from words of the same function, whose seeds and counters a batch may have too: as published runs drew them.
 #[repr(u32)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Draw {

@@ -70,7 +70,9 @@ fn add(hasher: &mut Hasher, Field { origin, cells_per_metre, columns, rows, cell
 
 #[cfg(test)]
 mod tests {
+    use crate::files::cache::Loading;
     use crate::scenario::Scenario;
+    use crate::world::Traffic;
 
     use super::*;
 
@@ -111,5 +113,37 @@ mod tests {
             assert_ne!(other.fingerprint(), before, "{table}");
         }
         assert_eq!(world.clone().fingerprint(), before);
+    }
+
+    #[test]
+    fn a_change_of_any_table_of_other_vehicles_is_another_fingerprint() {
+        let text = Scenario::text_of("traffic2026").unwrap().replace("300.0, 900.0, 1500.0, 2100.0", "300.0");
+        let scenario = Scenario::parse("traffic2026", &text, None, &Loading::PLAIN).unwrap();
+        let world = World::bake(&scenario).unwrap();
+        let before = world.fingerprint();
+        let alone = World { traffic: None, ..world.clone() };
+        assert_ne!(alone.fingerprint(), before);
+        assert!(alone.bytes() + 100_000 < world.bytes(), "{} {}", alone.bytes(), world.bytes());
+        let changes: [(&'static str, fn(&mut Traffic)); 11] = [
+            ("rules", |traffic| traffic.rules.courtesy += 1),
+            ("rude", |traffic| traffic.rude[1] += 1),
+            ("spacing", |traffic| traffic.spacing += 0.1),
+            ("is_observed", |traffic| traffic.is_observed = !traffic.is_observed),
+            ("hindrance", |traffic| traffic.hindrance -= 1.0),
+            ("group", |traffic| traffic.group = 2),
+            ("networks", |traffic| traffic.roads[1].network.paths[2].line += 1),
+            ("demands", |traffic| {
+                let other = traffic.roads[0].levels[0].demand.clone();
+                traffic.roads[1].levels[0].demand = other;
+            }),
+            ("snapshots", |traffic| traffic.roads[1].levels[0].snapshots[3].backlog[0] += 1),
+            ("paths of routes", |traffic| traffic.routes[3].path += 1),
+            ("beginnings of routes", |traffic| traffic.routes[3].begins += 0.1),
+        ];
+        for (table, change) in changes {
+            let mut other = world.clone();
+            change(other.traffic.as_mut().unwrap());
+            assert_ne!(other.fingerprint(), before, "{table}");
+        }
     }
 }

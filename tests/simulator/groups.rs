@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use offtrack::files::cache::Loading;
-use offtrack::layout::{Ended, N_CARS, VEHICLE_VALUES};
+use offtrack::layout::{Ended, N_CARS, Truck, VEHICLE_VALUES};
 use offtrack::scenario::{Scenario, Split};
 use offtrack::simulator::{Autoreset, Begin, Engine, Error, RouteChoice, Simulator};
 use offtrack::traffic::{Car, Contact, Row};
@@ -207,6 +207,43 @@ fn cars_give_way_to_every_truck_of_a_group() {
         }
     }
     assert!(50 < by_the_other, "{by_the_other}");
+}
+
+#[test]
+fn cars_that_come_to_two_trucks_at_the_same_place_decide_alike_in_the_rows_of_both() {
+    let (scenario, world) = world(2);
+    for (name, engine) in engines() {
+        let mut simulator = batch_on(&engine, &world, 128, 9, drawn(&scenario));
+        simulator.set_autoreset(Autoreset::Disabled);
+        for step in 0..60 {
+            // One stands and one drives where the route of the first leads, each pair elsewhere on it.
+            let mut batch = simulator.batch().clone();
+            for first in (0..128).step_by(2) {
+                let waypoints = world.route_waypoints(batch.truck[first].route);
+                let place = (first / 2 * waypoints.len() / 64).min(waypoints.len() - 2);
+                let at = waypoints[place];
+                for (env, speed) in [(first, 0.0), (first + 1, 4.0)] {
+                    let heading = at.direction.to_angle();
+                    batch.truck[env] = Truck {
+                        position: at.position,
+                        heading,
+                        trailer_heading: heading,
+                        speed,
+                        held: 0,
+                        ..batch.truck[first]
+                    };
+                    batch.progress[env].waypoint = place as u32 + 1;
+                    batch.ended[env] = Ended::Running as u32;
+                    Row::of_mut(&mut batch.cars[env]).met = 0;
+                }
+            }
+            simulator.restore(|column| Some(batch.column(column))).unwrap();
+            simulator.step_at_random();
+            for first in (0..128).step_by(2) {
+                assert_eq!(shared(&simulator, first), shared(&simulator, first + 1), "{name}, step {step}, {first}");
+            }
+        }
+    }
 }
 
 #[test]

@@ -56,6 +56,7 @@ fn ways_that_lead_nowhere_are_refused_with_what_there_is() {
     let map = town();
     let refused = |ways: &[Way]| map.through(ways, &Options::default()).unwrap_err().to_string();
     for (ways, expected) in [
+        (Vec::new(), "ways: none; at least one is needed"),
         (vec![way(("999", -1), ("34", -1))], "from.road: \"999\"; the map has no such road"),
         (vec![way(("90", 7), ("34", -1))], "from.lane: 7; road 90 has the lanes [-1, 1] to drive on"),
         (vec![way(("18", -1), ("51", 1))], "radius: "),

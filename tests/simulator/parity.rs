@@ -318,9 +318,9 @@ fn a_whole_step_from_any_state_ends_alike_for_every_reason_there_is() {
 fn the_largest_rewards_that_a_benchmark_may_give_are_summed_alike() {
     let mut world = World::clone(&world(Gutter::Drivable));
     let (choice, before) = varied(&world.clone().into(), false);
-    // Whole numbers, which every engine adds up to the same reward.
+    // Whole numbers, which every engine adds up to the same reward, as large as what 24 hard braking vehicles may cost.
     let weights = &mut world.reward;
-    (weights.waypoint, weights.failure) = (1e6, -1e6);
+    (weights.waypoint, weights.failure) = (2e8, -2e8);
     (weights.lane_distance, weights.clearance) = (0.0, 0.0);
     let [here, there] = simulators(&Arc::new(world), &choice).map(|mut simulator| {
         put(&mut simulator, &before);

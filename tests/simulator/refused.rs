@@ -4,9 +4,9 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use offtrack::layout::Column;
+use offtrack::layout::{Column, Stream};
 use offtrack::scenario::{ActionKind, Scenario};
-use offtrack::simulator::{Error, RouteChoice, Simulator};
+use offtrack::simulator::{Begin, Error, RouteChoice, Simulator};
 use offtrack::world::World;
 
 use crate::benchmark;
@@ -30,6 +30,18 @@ fn a_batch_too_large_for_the_memory_is_refused_with_its_size_and_what_would_fit(
     // More than the machine has, less than it grants: filling the columns would end the process.
     let Err(Error::BatchTooLarge { fitting, .. }) = new(1 << 40) else { panic!() };
     assert!(matches!(new(2 * fitting as usize), Err(Error::BatchTooLarge { .. })));
+}
+
+#[test]
+fn a_truck_that_is_to_begin_twice_at_once_is_refused_and_leaves_the_batch() {
+    let world = Arc::new(benchmark("attard2023").1);
+    let mut simulator = Simulator::new(world, 2, 0, RouteChoice::Drawn(vec![0])).unwrap();
+    let before = simulator.batch().clone();
+    let of = |env: usize| Begin { env, ..Begin::default() };
+    let error = simulator.begin(&[of(1), Begin { stream: Some(Stream { seed: 5, env: 7 }), ..of(1) }]).unwrap_err();
+    assert_eq!(error, Error::RepeatedTruck { position: 1, index: 1 });
+    assert!(simulator.batch().columns() == before.columns());
+    assert_eq!(simulator.streams()[1], Stream { seed: 0, env: 1 });
 }
 
 #[test]

@@ -14,10 +14,15 @@ fn begun(place: &Place) -> Child {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    while !place.file("runs/run/metrics.csv").is_file() {
+    wait_for(place, "runs/run/metrics.csv");
+    run
+}
+
+/// Waits until a file is there.
+fn wait_for(place: &Place, file: &str) {
+    while !place.file(file).is_file() {
         std::thread::sleep(Duration::from_millis(10));
     }
-    run
 }
 
 fn ended(run: Child, signal: &str) -> Output {
@@ -72,4 +77,24 @@ fn a_run_killed_in_its_first_seconds_leaves_a_policy_and_a_checkpoint_to_continu
     let resumed = program().args(["train", "--resume", &place.text("runs/run"), "--steps", "2000"]).output().unwrap();
     succeed(&resumed);
     assert_eq!(place.json("runs/run/report.json")["env_steps"], 2000);
+}
+
+#[test]
+fn a_run_that_begins_again_for_want_of_a_checkpoint_has_no_rows_of_before() {
+    let place = Place::new();
+    let run = begun(&place);
+    wait_for(&place, "runs/run/checkpoint.safetensors");
+    ended(run, "-KILL");
+    std::fs::remove_file(place.file("runs/run/checkpoint.safetensors")).unwrap();
+    // As if it had been killed while it wrote its first checkpoint, after a row.
+    let file = place.file("runs/run/metrics.csv");
+    let metrics = std::fs::read_to_string(&file).unwrap();
+    let row = format!("5.0,999999{}", ",".repeat(metrics.lines().next().unwrap().matches(',').count() - 1));
+    std::fs::write(&file, format!("{metrics}{row}\n")).unwrap();
+    let again = ["train", "--resume", &place.text("runs/run"), "--steps", "800"];
+    succeed(&program().args(again).output().unwrap());
+    let metrics = std::fs::read_to_string(file).unwrap();
+    let steps: Vec<&str> = metrics.lines().skip(1).map(|row| row.split(',').nth(1).unwrap()).collect();
+    assert_eq!(steps.last(), Some(&"800"), "{metrics}");
+    assert!(!steps.contains(&"999999"), "{metrics}");
 }

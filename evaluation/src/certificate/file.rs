@@ -38,7 +38,7 @@ pub struct Certificate {
     pub version: u32,
     /// The benchmark's name.
     pub benchmark: String,
-    /// `test`, `train` or `all`.
+    /// `test`, `train`, `validation` or `all`.
     pub split: String,
     /// The policy whose actions were among the candidates.
     pub policy: Option<String>,

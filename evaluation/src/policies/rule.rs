@@ -89,8 +89,8 @@ impl Rule {
         Ok(Rule { steers: Policy::shipped(STEERS)?, yields: name == YIELDS })
     }
 
-    /// The actions that trucks make where these were chosen, `[n_envs]` each: none faster than the rule allows. That of
-    /// the nearest speed takes the place of one that is.
+    /// The actions that trucks make where these were chosen, `[n_envs]` each. Where one is faster than the rule allows,
+    /// that of the speed nearest to what it allows takes its place: at most half a level faster.
     pub fn capped(&self, world: &World, batch: &Batch, chosen: &[u32]) -> Vec<u32> {
         let capped = |(env, &index): (usize, &u32)| {
             let Action { steering, speed } = world.actions[index as usize];

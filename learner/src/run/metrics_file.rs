@@ -90,6 +90,11 @@ impl MetricsFile {
         Ok(())
     }
 
+    /// Removes all rows.
+    pub fn clear(&mut self) -> Result<(), Error> {
+        self.cut(HEAD.len() as u64)
+    }
+
     /// Removes the rows after the first `length` bytes.
     pub fn cut(&mut self, length: u64) -> Result<(), Error> {
         if self.length < length {

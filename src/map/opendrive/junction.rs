@@ -131,11 +131,14 @@ impl Map {
     ///
     /// # Errors
     ///
-    /// A road or lane that the map does not have, a way that its links do not lead along, junctions too far from each
+    /// No way, a road or lane that the map does not have, a way that its links do not lead along, junctions too far from each
     /// other, or ways that would have the same name.
     pub fn through(&self, ways: &[Way], options: &Options) -> Result<Imported, Error> {
         let name = ways.iter().map(Way::to_string).collect::<Vec<_>>().join(", ");
         let refused = Refusals { reader: Reader::of(&self.file), place: format!("way {}", shown(&name)) };
+        if ways.is_empty() {
+            return Err(refused.error("ways", "none", "at least one is needed"));
+        }
         let whole = self.network();
         let mut found: Vec<(&Way, Vec<usize>)> = Vec::new();
         for way in ways {
