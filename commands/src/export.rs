@@ -6,7 +6,8 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use offtrack::files::reader::shown_path;
 use offtrack::map::chosen::is_map;
 use offtrack::map::drawing::is_geojson;
-use offtrack::map::{Gutter, opendrive};
+use offtrack::map::opendrive::{self, Map};
+use offtrack::map::{Gutter, Road};
 use offtrack_drawing::fits::geojson;
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
@@ -71,7 +72,16 @@ pub fn run(args: &Args) -> Result<(), Error> {
         return refused("--crs", name.clone(), "is for .geojson: leave it out");
     }
     outputs::distinct(&[("--output", Some(&args.output))], &[("ROAD", Some(file))])?;
-    let road = roads::road(&args.road, &args.place)?;
+    let road = if is_map(file) {
+        let map = Map::read(file, args.place.hand)?;
+        if let (Some(name), Some(_)) = (&args.crs, map.header_offset()) {
+            let expected = "the map's header has an offset, which is not applied: its coordinates are in no such frame";
+            return refused("--crs", name.clone(), expected);
+        }
+        Road::in_map(file, &map, &args.place.choice())?
+    } else {
+        roads::road(&args.road, &args.place)?
+    };
     let text = if is_geojson {
         geojson(&road.seen(), args.gutter, &[], args.crs.as_deref())
             .map_err(|error| Error::write(&args.output)(error.into()))?

@@ -25,7 +25,7 @@ pub struct Choice {
 
 /// Whether a file is an OpenDRIVE map by its name.
 pub fn is_map(file: &Path) -> bool {
-    file.extension().is_some_and(|extension| extension == "xodr")
+    file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("xodr"))
 }
 
 impl Choice {
@@ -84,12 +84,10 @@ impl Road {
     pub fn in_map(file: &Path, map: &Map, choice: &Choice) -> Result<Road, Error> {
         let stem = || file.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
         let name = choice.name.clone().unwrap_or_else(stem);
-        if name.is_empty() || 40 < name.len() || name.contains('/') || name.chars().any(char::is_control) {
-            return Err(Reader::of(file).invalid(
-                "name",
-                format!("{name:?}"),
-                "must be 1 to 40 characters without a slash",
-            ));
+        if name.is_empty() || 40 < name.chars().count() || name.contains('/') || name.chars().any(char::is_control) {
+            let rename = if choice.name.is_none() { "; rename the file" } else { "" };
+            let expected = format!("must be 1 to 40 characters without a slash{rename}");
+            return Err(Reader::of(file).invalid("name", format!("{name:?}"), expected));
         }
         Ok(Road::on(name, choice.imported(file, map)?.ground))
     }

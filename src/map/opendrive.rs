@@ -128,6 +128,12 @@ impl Map {
         self.records.warnings.iter().chain(&self.graph.warnings).map(String::as_str)
     }
 
+    /// By what its header moves the map, x, y and z (m), then a turn (rad), where that is not nothing. It is not done:
+    /// all coordinates are the file's.
+    pub fn header_offset(&self) -> Option<[f64; 4]> {
+        self.records.offset
+    }
+
     /// Whether the map has left-hand traffic: what is imported from it is its mirror image in the x axis.
     pub fn is_mirrored(&self) -> bool {
         self.records.mirrored

@@ -151,7 +151,13 @@ impl Refused {
 pub fn find(name_or_path: &str) -> Result<Road, Error> {
     match address(name_or_path) {
         Some((distribution, seed, index)) => Ok(Distribution::find(distribution)?.road(seed, index)?.roundabout),
-        None => Road::find(name_or_path),
+        None => Road::find(name_or_path).map_err(|error| match error {
+            Error::UnknownName { what, name, mut known } => {
+                known.push("a random road's DISTRIBUTION/SEED/INDEX, as wide/7/12, of numbers in 0..4294967295");
+                Error::UnknownName { what, name, known }
+            }
+            error => error,
+        }),
     }
 }
 

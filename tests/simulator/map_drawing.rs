@@ -117,6 +117,13 @@ fn features_are_a_road_by_their_layer_in_metres_or_the_unit_that_is_asked_for() 
     assert!(ground.origin.distance(AT) < 1e-3 && (ground.island_radius - 10.0).abs() < 2e-3, "{ground:?}");
     assert_eq!((ground.faces.loops.len(), ground.lines.len(), ground.arms.len()), (2, 2, 2));
     assert!(notes.iter().any(|note| note.contains("1 features of 1 other parts")), "{notes:?}");
+    let mut less = features();
+    less["features"][2]["geometry"].take();
+    let Drawn { ground: one_way, notes } = read_features(&less.to_string(), None).unwrap();
+    assert!(
+        one_way.lines.len() == 1 && notes.contains(&"feature 3 has no geometry and is left out".into()),
+        "{notes:?}"
+    );
     let Drawn { ground, .. } = read_features(&features().to_string(), Some(Unit::Foot)).unwrap();
     assert!((ground.island_radius - 3.048).abs() < 2e-3, "{}", ground.island_radius);
 }

@@ -1,5 +1,6 @@
 //! Maps that contradict themselves or say more than is read: what is said of it, and what is left alone.
 
+use glam::DVec2;
 use offtrack::map::opendrive::Options;
 
 use crate::map_kinds::{imported, parsed, plain};
@@ -156,4 +157,47 @@ fn an_arm_that_leads_into_another_ring_nearby_is_said_to_end_there_and_not_to_la
     // Farther apart the arm reaches the edge of what is driven.
     let apart = parsed(&dumbbell(100.0));
     assert_eq!(apart.ground(&apart.rings()[0], &Options::default()).unwrap().warnings, [""; 0]);
+}
+
+#[test]
+fn a_raised_strip_is_a_kerb_by_its_width_whether_widths_or_borders_say_so() {
+    // Along the eastern arm, in its lane in: right of a line, or left of one that leads the other way.
+    const KERB: DVec2 = DVec2::new(55.0, -3.0);
+    let faces = |wide: f64, element: &str, side: f64| {
+        let (x, heading) = if side < 0.0 { (45.0, 0.0) } else { (65.0, std::f64::consts::PI) };
+        // The second lane of its side: a border is where it ends, a width how wide it is.
+        let at = |width: f64, border: f64| {
+            let value = if element == "width" { width } else { side * border };
+            format!("<{element} sOffset=\"0\" a=\"{value}\" b=\"0\" c=\"0\" d=\"0\"/>")
+        };
+        let ids = [side, 2.0 * side];
+        let inner = format!("<lane id=\"{}\" type=\"none\">{}</lane>", ids[0], at(1.5, 1.5));
+        let height = "<height sOffset=\"0\" inner=\"0.15\" outer=\"0.15\"/>";
+        let outer = format!("<lane id=\"{}\" type=\"sidewalk\">{}{height}</lane>", ids[1], at(wide, 1.5 + wide));
+        let (name, lanes) = if side < 0.0 { ("right", inner + &outer) } else { ("left", outer + &inner) };
+        let road = format!(
+            "<road id=\"777\" junction=\"-1\" length=\"20\"><planView><geometry s=\"0\" x=\"{x}\" y=\"-1.5\" \
+             hdg=\"{heading}\" length=\"20\"><line/></geometry></planView><lanes><laneSection s=\"0\"><center><lane \
+             id=\"0\" type=\"none\"/></center><{name}>{lanes}</{name}></laneSection></lanes></road>"
+        );
+        imported(&parsed(&plain().replace("</OpenDRIVE>", &format!("{road}</OpenDRIVE>")))).ground.faces
+    };
+    for side in [-1.0, 1.0] {
+        let [kerb, walk] = [0.3, 2.5].map(|wide| faces(wide, "width", side));
+        // A kerb wins over the lane that it lies in, a walk does not.
+        assert!(kerb.distance(KERB) < 0.01 && 1.0 < walk.distance(KERB), "{side}");
+        assert_eq!([0.3, 2.5].map(|wide| faces(wide, "border", side)), [kerb, walk], "{side}");
+    }
+}
+
+#[test]
+fn an_offset_of_the_header_is_said_not_to_be_applied() {
+    let offset = "<offset x=\"1000\" y=\"2000\" z=\"0\" hdg=\"0.5\"/></header>";
+    let text = plain();
+    let map = parsed(&text.replace("</header>", offset));
+    assert_eq!(map.header_offset(), Some([1000.0, 2000.0, 0.0, 0.5]));
+    let said =
+        |warnings: &[String]| warnings.iter().any(|warning| warning.contains("offset (1000, 2000, 0) m, 0.5 rad"));
+    assert!(said(&imported(&map).warnings), "{:?}", imported(&map).warnings);
+    assert_eq!((parsed(&text).header_offset(), said(&imported(&parsed(&text)).warnings)), (None, false));
 }

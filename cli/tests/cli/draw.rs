@@ -245,6 +245,7 @@ fn wrong_input_is_refused_with_exit_code_2_and_says_what_would_do() {
     refuse(&[&place, "-o", svg, "--approach", "1e308"], 2, "--approach: 1e308 m; must lie in 5..500 m");
     refuse(&[&place, "-o", svg, "--approach", "400"], 2, "--approach: 400 m; approach of 400 m leaves arm");
     refuse(&["21m", "-o", svg], 2, "roundabout: 21m; must be a path ending in .toml or one of 16m, ");
+    refuse(&["wide/7/99999999999", "-o", svg], 2, "DISTRIBUTION/SEED/INDEX, as wide/7/12");
     refuse(&["nowhere.toml", "-o", svg], 2, "nowhere.toml: cannot be read");
     assert_eq!(
         std::fs::read_dir(folder.path()).expect("a folder").count(),

@@ -94,6 +94,13 @@ pub fn run(args: &Args) -> Result<(), Error> {
         ring: args.place.ring,
         arms: args.arms.clone(),
     };
+    let named = [("--kerb-layer", &layers.kerbs), ("--lane-layer", &layers.lanes), ("--apron-layer", &layers.aprons)];
+    for (index, (flag, layer)) in named.iter().enumerate() {
+        if let Some((other, _)) = named[..index].iter().find(|(_, other)| other.eq_ignore_ascii_case(layer)) {
+            let expected = format!("is that of {other} too: each part is on a layer of its own");
+            return Err(Error::Setting { name: flag, value: layer.to_string(), expected });
+        }
+    }
     let Drawn { ground, notes } = drawing::read(&args.map, &layers)?;
     let name = args.map.file_name().map(|name| name.to_string_lossy().escape_debug().to_string()).unwrap_or_default();
     let comment = [

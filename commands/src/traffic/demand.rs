@@ -1,6 +1,8 @@
 //! A demand as the flag has it: of the whole road, of arms, or from arm to arm.
 
-use offtrack::traffic::demand::share;
+use std::collections::HashSet;
+
+use offtrack::traffic::demand::{MOST, share};
 use offtrack::traffic::{Demand, Mix};
 use offtrack_evaluation::error::Error;
 
@@ -10,7 +12,10 @@ impl Place {
     /// The demand that the flag asks for, and its flow by path (veh/h).
     pub(super) fn demand(&self, text: &str, mix: Mix) -> Result<(Demand, Vec<f64>), Error> {
         let flows = match text.parse() {
-            Ok(total) => Demand::even(&self.network, total),
+            Ok(total) => {
+                check(total).map_err(|wrong| setting("--demand", text, &format!("{}: {wrong}", self.road.name)))?;
+                Demand::even(&self.network, total)
+            }
             Err(_) => self.by_arm(text)?,
         };
         let demand = Demand::new(&self.network, &flows, mix)
@@ -22,9 +27,15 @@ impl Place {
     fn by_arm(&self, text: &str) -> Result<Vec<f64>, Error> {
         let arms: Vec<&str> = self.road.arms().collect();
         let mut flows = vec![0.0; self.network.paths.len()];
+        let mut seen = HashSet::new();
         for item in text.split(',') {
             let known = item.split_once('=').and_then(|(key, flow)| Some((key, flow.parse::<f64>().ok()?)));
             let Some((key, flow)) = known else { return Err(self.unknown(text, item)) };
+            if !seen.insert(key) {
+                return Err(setting("--demand", text, &format!("`{key}` is given twice on {}", self.road.name)));
+            }
+            check(flow)
+                .map_err(|wrong| setting("--demand", text, &format!("`{item}` of {}: {wrong}", self.road.name)))?;
             let mut has_path = false;
             for (from, entry) in arms.iter().enumerate() {
                 let whole = *entry == key;
@@ -65,6 +76,11 @@ impl Place {
     }
 }
 
+/// What is wrong with a flow that the flag states (veh/h).
+fn check(flow: f64) -> Result<(), String> {
+    if (0.0..=MOST).contains(&flow) { Ok(()) } else { Err(format!("must lie in 0..{MOST} cars an hour")) }
+}
+
 #[cfg(test)]
 mod tests {
     use offtrack::map::Road;
@@ -89,7 +105,7 @@ mod tests {
             place.network.source_of(path).entry == 1 && place.network.paths[path].exit_arm != 0 && 0.0 < flows[path]
         };
         assert!(!(0..flows.len()).any(leads_elsewhere));
-        for wrong in ["", "N", "X=3", "N=x", "-5", "1e9"] {
+        for wrong in ["", "N", "X=3", "N=x", "-5", "1e9", "N=1e9", "N=10,N=20"] {
             let message = of(wrong).unwrap_err().to_string();
             assert!(message.starts_with(&format!("--demand: {wrong}; ")) && message.contains("16m"), "{message}");
         }

@@ -97,7 +97,10 @@ pub(super) fn drawing(file: &Path, text: &str, layers: &Layers) -> Result<Drawin
     for (index, feature) in collection.features.iter().enumerate() {
         let (part, place) = (feature.part(), format!("feature {}", index + 1));
         let is = |layer: &str| part.eq_ignore_ascii_case(layer);
-        let Some(geometry) = &feature.geometry else { continue };
+        let Some(geometry) = &feature.geometry else {
+            drawing.notes.push(format!("{place} has no geometry and is left out"));
+            continue;
+        };
         let shape = Shape { reader: &reader, place: &place, geometry, metres };
         if is(&layers.kerbs) {
             drawing.kerbs.extend(shape.kerbs(&mut left)?);

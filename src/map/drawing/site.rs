@@ -7,6 +7,7 @@ use glam::DVec2;
 
 use super::{Drawing, Entity, Layers, aprons};
 use crate::files::reader::{Error, Reader};
+use crate::geometry::area::densified;
 use crate::geometry::{Curve, Outline, Piece, fitted_line, wrapped};
 use crate::map::apron;
 use crate::map::ground::{Arm, Edges, Ground, Kerb, Line};
@@ -131,14 +132,16 @@ fn closed(reader: &Reader, drawn: Vec<Entity>, layer: &str, notes: &mut Vec<Stri
 /// The centre and the radius of the central island.
 fn island(reader: &Reader, loops: &[Curve], layers: &Layers, near: Option<DVec2>) -> Result<(DVec2, f64), Error> {
     let outer = (0..loops.len()).max_by(|&a, &b| loops[a].signed_area().abs().total_cmp(&loops[b].signed_area().abs()));
-    let circle = |curve: &Curve| fitted_circle(&curve.polyline(0.002));
+    let circle = |curve: &Curve| fitted_circle(&densified(&curve.polyline(0.002), 0.25));
     let islands = loops.iter().enumerate().filter(|(index, _)| Some(*index) != outer);
     let round = islands.filter_map(|(_, curve)| circle(curve)).filter(|(_, radius, off)| *off < ROUND * radius);
     let nearest = |one: &(DVec2, f64, f64)| near.map_or(-one.1, |ring| ring.distance(one.0));
     let found = round.min_by(|one, other| nearest(one).total_cmp(&nearest(other)));
     let found = found.map(|(centre, radius, _)| (centre, radius));
     found.ok_or_else(|| {
-        let expected = format!("a round island among the {} outlines on layer {} is needed", loops.len(), layers.kerbs);
+        let (n, layer) = (loops.len(), &layers.kerbs);
+        let expected =
+            format!("among the {n} outlines on layer {layer} an island within {ROUND} of a circle is needed");
         reader.invalid("ring", "none", expected)
     })
 }

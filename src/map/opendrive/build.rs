@@ -165,6 +165,12 @@ impl Site<'_> {
             return Err(refused.error("routes", found, expected));
         }
         routes.check(&faces);
+        routes.warnings.extend(map.header_offset().map(|[x, y, z, turn]| {
+            let place = &refused.place;
+            format!(
+                "{place}: the header's offset ({x}, {y}, {z}) m, {turn} rad is not applied: coordinates are the file's"
+            )
+        }));
         routes.warnings.extend(tilt(map, network).map(|tilt| format!("{}: {tilt}", refused.place)));
         let Lines { mut lines, warnings, .. } = routes;
         lines.sort_by_key(|line| (line.entry, line.lane == Lane::Right, line.exit));

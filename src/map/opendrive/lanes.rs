@@ -155,7 +155,7 @@ pub(super) fn sampled(road: &RoadRecord, index: usize, section: usize, tolerance
             before = after;
         }
     }
-    let kinds = of.lanes.iter().map(|lane| kind(lane, of, &breaks));
+    let kinds = (0..of.lanes.len()).map(|index| kind(road, of, index, &breaks));
     let strip = |(index_of_lane, (lane, kind)): (usize, (&Lane, Kind))| {
         let edge = |inner: bool| {
             samples.iter().map(move |sample| sample.edges[index_of_lane][usize::from(!inner)]).collect::<Vec<_>>()
@@ -169,14 +169,19 @@ pub(super) fn sampled(road: &RoadRecord, index: usize, section: usize, tolerance
     of.lanes.iter().zip(kinds).enumerate().map(strip).collect()
 }
 
-/// What a lane is for, once its height and width are known.
-fn kind(lane: &Lane, section: &Section, breaks: &[f64]) -> Kind {
+/// What a lane of a section is for, once its height and width are known.
+fn kind(road: &RoadRecord, section: &Section, index: usize, breaks: &[f64]) -> Kind {
+    let lane = &section.lanes[index];
     let raised = lane.heights.iter().any(|height| RAISED < height.height);
     match lane.kind {
         Kind::Lane | Kind::Kerb | Kind::Apron => lane.kind,
         _ if !raised => lane.kind,
         _ => {
             let width = |s: f64| {
+                if lane.bordered {
+                    let [inner, outer] = Sample::new(road, section, s).edges[index];
+                    return inner.distance(outer);
+                }
                 active(&lane.widths, s - section.start, |width| width.start)
                     .map_or(0.0, |width| width.at(s - section.start))
             };

@@ -67,6 +67,9 @@ pub(super) fn records(file: &Path, text: &str, hand: Hand) -> Result<Records, Er
         Hand::Left => true,
         Hand::Map => source.left_hand(root),
     };
+    let offset = child(root, "header").and_then(|header| child(header, "offset"));
+    let offset = offset.map(|offset| ["x", "y", "z", "hdg"].map(|key| attribute(offset, key).parse().unwrap_or(0.0)));
+    source.records.offset = offset.filter(|offset| *offset != [0.0; 4]);
     let signals = root.descendants().filter(|node| node.has_tag_name("signal")).count();
     if 0 < signals {
         source.records.warnings.push(format!("{signals} signals are not read"));

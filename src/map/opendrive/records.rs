@@ -201,6 +201,8 @@ pub(super) struct Records {
     pub(super) junctions: HashMap<String, Vec<Connection>>,
     /// Whether the map has left-hand traffic, so that the records are its mirror image.
     pub(super) mirrored: bool,
+    /// By what its header moves the map, which is not done: x, y and z (m), then a turn (rad). None if by nothing.
+    pub(super) offset: Option<[f64; 4]>,
     /// Lane types that are not known, with their numbers of lanes.
     pub(super) unknown_types: BTreeMap<String, usize>,
     /// What is odd in the file, and what was done about it.
