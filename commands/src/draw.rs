@@ -20,7 +20,7 @@ use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 
 use crate::import::PlaceArgs;
-use crate::roads;
+use crate::{outputs, roads};
 
 /// Draw a roundabout, or a truck's swept path on one of its routes.
 #[derive(Debug, clap::Args)]
@@ -112,6 +112,9 @@ pub fn run(args: &Args) -> Result<(), Error> {
         let expected = "must end in .svg or .png with --traffic".into();
         return Err(Error::Setting { name: "--output", value: args.output.display().to_string(), expected });
     }
+    let read = [("ROUNDABOUT", &args.roundabout), ("--vehicle", &args.vehicle)];
+    let read = read.map(|(flag, name)| (flag, Some(Path::new(name))));
+    outputs::distinct(&[("--output", Some(&args.output))], &read)?;
     let driven = roads::road(&args.roundabout, &args.place)?;
     let roundabout = driven.seen();
     let routes = roundabout.routes(args.approach, args.departure, WAYPOINT_SPACING).map_err(|leaves| {

@@ -98,6 +98,7 @@ pub fn run(args: &Args) -> Result<bool, Error> {
         args.vehicle_names().map(|name| vehicle(name, &args.load)).collect::<Result<_, _>>()?;
     unlike("ROAD", roads.iter().map(stem))?;
     unlike("--vehicle", vehicles.iter().map(|(name, _)| name.clone()))?;
+    unlike("ROAD-VEHICLE", roads.iter().flat_map(|road| vehicles.iter().map(|(name, _)| of_both(road, name))))?;
     check_routes(&roads, &args.route)?;
     let mut results = Results::new(asked.clone(), humantime::format_rfc3339_seconds(SystemTime::now()).to_string());
     roads.iter().for_each(|road| results.add_road(road));
@@ -226,7 +227,7 @@ impl Work<'_> {
         files::write_whole(&printed, &pdf)?;
         for (name, _) in self.vehicles {
             let of: Vec<&Shown> = shown.iter().filter(|one| one.row.vehicle == *name).collect();
-            let file = |extension: &str| self.args.output.join(format!("{}-{name}.{extension}", stem(road)));
+            let file = |extension: &str| self.args.output.join(format!("{}.{extension}", of_both(road, name)));
             let gutter = self.asked.gutter;
             files::write_whole(&file("dxf"), dxf(road, gutter, &of).as_bytes())?;
             let features = file("geojson");
@@ -241,6 +242,11 @@ impl Work<'_> {
 /// A road's name as that of a file.
 fn stem(road: &Road) -> String {
     road.name.replace(['/', '\\'], "-")
+}
+
+/// The name of a road's files that are a vehicle's.
+fn of_both(road: &Road, vehicle: &str) -> String {
+    format!("{}-{vehicle}", stem(road))
 }
 
 /// What is asked, checked.

@@ -76,6 +76,11 @@ fn resolved(file: &Path) -> Option<PathBuf> {
         Ok(to) if !file.exists() => &file.parent().unwrap_or(Path::new("")).join(to),
         _ => file,
     };
+    if let Ok(file) = file.canonicalize() {
+        return Some(file);
+    }
     let folder = file.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
-    file.canonicalize().ok().or_else(|| Some(folder.canonicalize().ok()?.join(file.file_name()?)))
+    // A folder that is not there yet may be made by the command.
+    let folder = if folder == file { None } else { resolved(folder) };
+    Some(folder?.join(file.file_name()?))
 }

@@ -10,13 +10,14 @@ use offtrack::map::procedural;
 use offtrack::map::route::Route;
 use offtrack::map::{Gutter, Road};
 use offtrack::scenario::{Scenario, Split};
-use offtrack::simulator::{Engine, RouteChoice, Simulator};
+use offtrack::simulator::Engine;
 use offtrack::world::World;
 
 use offtrack_drawing::comparison::Comparison;
 use offtrack_drawing::episode::Scene;
 use offtrack_drawing::film::{self, Take};
 use offtrack_drawing::rasterised;
+use offtrack_evaluation::episodes::Episodes;
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 use offtrack_evaluation::policies::Controller;
@@ -278,11 +279,9 @@ fn driven(
     chosen: &Chosen,
     policy: &mut dyn Controller,
 ) -> Result<Track, Error> {
-    let trucks: Vec<u32> =
-        scenario.split(chosen.split).iter().flat_map(|&route| std::iter::repeat_n(route, args.episodes)).collect();
-    let env = chosen.in_split * args.episodes + args.episode;
-    let (engine, n_envs) = (engine.clone(), trucks.len());
-    let mut simulator = Simulator::on(engine, world.clone(), n_envs, args.seed, RouteChoice::Fixed(trucks))?;
+    let (routes, env) = (scenario.split(chosen.split), chosen.in_split * args.episodes + args.episode);
+    let begun = Episodes::begin(engine.clone(), world.clone(), routes, args.episodes, args.seed)?;
+    let mut simulator = begun.into_simulator();
     let mut recorder = Recorder::new(world, simulator.batch(), [env]);
     let limit = world.step_limit(&simulator.batch().truck[env]);
     let bar = progress::Bar::new("driving", "steps", limit as usize);

@@ -44,6 +44,11 @@ impl Episodes {
         &self.simulator
     }
 
+    /// The trucks at their starts, for a caller who steps them otherwise.
+    pub fn into_simulator(self) -> Simulator {
+        self.simulator
+    }
+
     /// Calls `step` until every episode has ended, and gives the end of each. `step` chooses an action for each truck
     /// and steps the simulator once. A truck is held where its episode ended, whatever action it is given.
     ///

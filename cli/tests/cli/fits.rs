@@ -201,6 +201,16 @@ fn wrong_input_is_refused_by_flag_and_value() {
         let said = refusal(&fits(&place, arguments), 2);
         assert!(said.contains(expected), "{expected}: {said}");
     }
+    // Two pairs of a road and a vehicle whose files would have one name.
+    for (from, to) in [("roundabouts/16m", "r"), ("roundabouts/16m", "r-b"), ("vehicles/daf_xf", "c")] {
+        let from = repository().join("scenarios").join(format!("{from}.toml"));
+        std::fs::copy(from, place.file(&format!("{to}.toml"))).unwrap();
+    }
+    std::fs::copy(place.file("c.toml"), place.file("b-c.toml")).unwrap();
+    let [r, r_b, c, b_c] = ["r.toml", "r-b.toml", "c.toml", "b-c.toml"].map(|name| place.text(name));
+    let alike = offtrack(&["fits", &r, &r_b, "--vehicle", &c, "--vehicle", &b_c, "-o", &place.text("none")]);
+    let said = refusal(&alike, 2);
+    assert!(said.contains("ROAD-VEHICLE: r-b-c; is named twice"), "{said}");
     assert!(refusal(&fits(&place, &["--vehicle", "daf_xf", "--widths", "0"]), 2).contains("--widths"));
     let none = offtrack(&["fits", "16m", "-o", &place.text("none")]);
     assert!(refusal(&none, 2).contains("--vehicle"));

@@ -5,7 +5,7 @@ use std::fs::{self, File, Permissions};
 use std::os::unix::fs::{FileTypeExt, PermissionsExt, symlink};
 use std::process::{Command, Stdio};
 
-use crate::place::{Place, program, repository, succeed};
+use crate::place::{Place, program, refusal, repository, succeed};
 
 const VECTORS: &str = "tests/data/physics_vectors.json";
 
@@ -124,4 +124,25 @@ fn a_run_goes_on_in_a_folder_whose_files_are_links_and_keeps_them_private() {
         assert_eq!(fs::metadata(&file).unwrap().permissions().mode() & 0o777, 0o600, "{name}");
     }
     assert_eq!(fs::read_dir(place.file("disk")).unwrap().count(), names.len());
+}
+
+#[test]
+fn an_output_that_is_an_input_or_another_output_is_refused_before_anything_is_written() {
+    let place = Place::new();
+    let vehicle = place.file("own.toml");
+    fs::copy(repository().join("scenarios/vehicles/daf_xf.toml"), &vehicle).unwrap();
+    let text = fs::read(&vehicle).unwrap();
+    symlink(&vehicle, place.file("link.svg")).unwrap();
+    let refused = |arguments: &[&str], expected: &str| {
+        let message = refusal(&program().args(arguments).output().unwrap(), 2);
+        assert!(message.contains(expected), "{message}");
+    };
+    let (own, link) = (place.text("own.toml"), place.text("link.svg"));
+    let draw = ["draw", "16m", "--route", "N-left-3", "--vehicle", &own, "-o", &link];
+    refused(&draw, "is the file of --vehicle too");
+    assert_eq!(fs::read(&vehicle).unwrap(), text);
+    // The folder is not there yet.
+    let (folder, sheet) = (place.text("roads"), place.text("roads/contact-sheet.svg"));
+    refused(&["generate", "--count", "1", "-o", &folder, "--plot", &sheet], "--plot: ");
+    assert!(!place.file("roads").exists());
 }

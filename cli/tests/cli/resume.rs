@@ -379,8 +379,13 @@ fn a_learner_that_diverges_stops_with_the_step_the_parameter_and_the_last_good_c
 }
 
 #[test]
-fn a_finished_run_without_its_checkpoint_keeps_its_policy_and_does_not_begin_anew() {
+fn a_run_that_ended_without_its_checkpoint_keeps_its_policy_and_does_not_begin_anew() {
     let place = place();
+    let run = begun(place.training(&[&["--name", "stopped"], &ENDLESS[..]].concat()));
+    wait_until("a checkpoint", || place.file("runs/stopped/checkpoint.safetensors").is_file());
+    succeed(&interrupted(run));
+    std::fs::remove_file(place.file("runs/stopped/checkpoint.safetensors")).unwrap();
+    assert!(refusal(&resume(&place, "stopped", &[]), 2).contains("it was stopped and its checkpoint is gone"));
     succeed(&place.train(&["--name", "run", "--steps", "800"]));
     std::fs::remove_file(place.file("runs/run/checkpoint.safetensors")).unwrap();
     let policy = bytes(&place, "runs/run/policy.safetensors");

@@ -36,11 +36,12 @@ impl Resumed {
         let folder = Folder::of(path)?;
         let has_new_budget = minutes.is_some() || steps.is_some();
         let mut config = Config::read(&folder.config())?;
-        if !folder.checkpoint().is_file() && is_evaluated(&folder) {
-            let policy = folder.policy();
+        // A report is written after the first checkpoint, when the run ends or is stopped.
+        if !folder.checkpoint().is_file() && folder.report().is_file() {
+            let ended = if is_evaluated(&folder) { "has finished" } else { "was stopped" };
             let expected = format!(
-                "it has finished and its checkpoint is gone: train --from {} begins a run with its policy",
-                policy.display()
+                "it {ended} and its checkpoint is gone: train --from {} begins a run with its policy",
+                folder.policy().display()
             );
             return Err(refused(path, expected));
         }
