@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from results import about, write_json
+from results import about, prepare, write_json, written
 from torch import nn
 
 import offtrack_sim
@@ -200,7 +200,7 @@ class Progress:
         """Writes the policy file, evaluates the policy once, and writes the results."""
         args = self.args
         seconds = time.perf_counter() - self.start
-        file = args.out.with_suffix(".safetensors")
+        file = written(args, ".safetensors")
         export.save(file, agent.actor, scenario=args.scenario, **export_as)
         policy = offtrack_sim.Policy.load(file)
         result = {
@@ -215,14 +215,15 @@ class Progress:
             "evaluation": offtrack_sim.evaluate(policy, args.benchmark, split=args.split).as_dict(),
             "curve": self.curve,
         }
-        write_json(args.out.with_suffix(".json"), result)
+        write_json(written(args, ".json"), result)
         found = result["evaluation"]
         print(f"{args.split} routes: {found['arrived']} of {found['episodes']} arrived, {found['success']:.1%}")
-        print(f"wrote {file} and {args.out.with_suffix('.json')}")
+        print(f"wrote {file} and {written(args, '.json')}")
 
 
 def main() -> None:
     args = arguments("PPO in one file, all trucks stepped together").parse_args()
+    prepare(args)
     # Networks this small gain little from more threads, and wait for them on a busy machine.
     torch.set_num_threads(1)
     torch.manual_seed(args.seed)
@@ -233,6 +234,8 @@ def main() -> None:
 
 def train(args: argparse.Namespace, envs: offtrack_sim.RoundaboutVector, agent: Agent) -> Progress:
     """Drives and learns in turns until the steps or the minutes are over."""
+    if args.minibatch < 2 or args.fragment < 1 or args.epochs < 1:
+        raise SystemExit("--minibatch must be at least 2, --fragment and --epochs at least 1")
     n_values, n_commands = envs.batch.n_values, envs.batch.n_commands
     optimizer = torch.optim.Adam(agent.parameters(), lr=args.learning_rate, eps=1e-5)
     observation, _ = envs.reset(seed=args.seed)

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import torch
 from cleanrl_ppo import Agent, arguments, train
+from results import prepare
 from torch import nn
 from torch.distributions import Normal
 
@@ -51,6 +52,7 @@ def main() -> None:
         scenario="attard2023-continuous", benchmark="attard2023-continuous", entropy=0.0, out=Path("ppo-continuous")
     )
     args = parser.parse_args()
+    prepare(args)
     # Networks this small gain little from more threads, and wait for them on a busy machine.
     torch.set_num_threads(1)
     torch.manual_seed(args.seed)

@@ -23,7 +23,7 @@ import numpy as np
 import pufferlib.pufferl
 import pufferlib.vector
 import torch
-from results import about, write_json
+from results import about, prepare, write_json, written
 from torch import nn
 
 import offtrack_sim
@@ -82,6 +82,7 @@ def main() -> None:
     )
     parser.add_argument("--out", type=Path, default=Path("puffer"), help="files to write, without their endings")
     args = parser.parse_args()
+    prepare(args)
 
     # Networks this small gain little from more threads, and wait for them on a busy machine.
     torch.set_num_threads(1)
@@ -133,7 +134,7 @@ def main() -> None:
     seconds = time.perf_counter() - start
     trainer.utilization.stop()
 
-    file = args.out.with_suffix(".safetensors")
+    file = written(args, ".safetensors")
     export.save(file, agent.actor, scenario=args.scenario)
     result = {
         "example": "puffer_ppo",
@@ -146,10 +147,10 @@ def main() -> None:
         "evaluation": offtrack_sim.evaluate(offtrack_sim.Policy.load(file), args.benchmark, split=args.split).as_dict(),
         "curve": curve,
     }
-    write_json(args.out.with_suffix(".json"), result)
+    write_json(written(args, ".json"), result)
     found = result["evaluation"]
     print(f"{args.split} routes: {found['arrived']} of {found['episodes']} arrived, {found['success']:.1%}")
-    print(f"wrote {file} and {args.out.with_suffix('.json')}")
+    print(f"wrote {file} and {written(args, '.json')}")
 
 
 if __name__ == "__main__":

@@ -33,6 +33,7 @@ import numpy as np
 import ray
 import torch
 from cleanrl_ppo import Agent, Fragment, Progress, arguments, update
+from results import prepare
 
 from offtrack_sim import Batch, Ended
 
@@ -103,6 +104,7 @@ def main() -> None:
     )
     parser.add_argument("--address", help="of a running Ray, HOST:PORT or auto; without it one is started for this run")
     args = parser.parse_args()
+    prepare(args)
     torch.manual_seed(args.seed)
     # Arrays that Ray hands over are read-only, and are only read here.
     warnings.filterwarnings("ignore", message="The given NumPy array is not writable")

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import platform
-import tempfile
 import time
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import offtrack_sim
+from offtrack_sim import Batch
 
 
 def about(*packages: str) -> dict[str, Any]:
@@ -36,10 +39,32 @@ def processor() -> str:
     return names[0].strip() if names else platform.processor()
 
 
+def prepare(args: argparse.Namespace) -> None:
+    """Finds out before a training what would be in the way of its end: the folder of ``--out``, and a benchmark for the
+    evaluation whose observations and actions are those of the one that is trained on. Ends the program with what is
+    wrong."""
+    for name in ("steps", "envs"):
+        if getattr(args, name) < 1:
+            raise SystemExit(f"--{name}: {getattr(args, name)}; must be at least 1")
+    try:
+        args.out.parent.mkdir(parents=True, exist_ok=True)
+        trained, judged = Batch(args.scenario, 1), Batch(args.benchmark, 1, split=args.split)
+    except (OSError, ValueError) as error:
+        raise SystemExit(str(error)) from None
+    tables = [
+        batch.action_table if batch.n_commands == 0 else np.zeros(batch.n_commands) for batch in (trained, judged)
+    ]
+    if trained.n_values != judged.n_values or not np.array_equal(*tables):
+        raise SystemExit(f"--benchmark: {args.benchmark}; has other observations or actions than {args.scenario}")
+
+
+def written(args: argparse.Namespace, ending: str) -> Path:
+    """A file to write: ``--out`` and this ending."""
+    return Path(f"{args.out}{ending}")
+
+
 def write_json(file: str | os.PathLike[str], content: Any) -> None:
     """Writes a file, whole or not at all."""
-    file = Path(file)
-    with tempfile.NamedTemporaryFile("w", dir=file.parent, delete=False) as part:
-        json.dump(content, part, indent=2)
-        part.write("\n")
-    os.replace(part.name, file)
+    part = Path(f"{os.fspath(file)}.part")
+    part.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+    os.replace(part, file)

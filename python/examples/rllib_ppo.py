@@ -25,7 +25,7 @@ from gymnasium.vector import VectorWrapper
 from ray.rllib.algorithms.ppo import PPOConfig
 from ray.rllib.core.rl_module.default_model_config import DefaultModelConfig
 from ray.tune.registry import register_env
-from results import about, write_json
+from results import about, prepare, write_json, written
 
 import offtrack_sim
 from offtrack_sim import Ended, export
@@ -95,6 +95,7 @@ def main() -> None:
     )
     parser.add_argument("--out", type=Path, default=Path("rllib"), help="files to write, without their endings")
     args = parser.parse_args()
+    prepare(args)
 
     examples = str(Path(__file__).resolve().parent)
     ray.init(address=args.address, runtime_env={"working_dir": examples}, log_to_driver=False)
@@ -151,7 +152,7 @@ def main() -> None:
         print("interrupted: what was learned is kept", flush=True)
     seconds = time.perf_counter() - start
 
-    file = args.out.with_suffix(".safetensors")
+    file = written(args, ".safetensors")
     export.save(file, linear_layers(algorithm.get_module()), scenario=args.scenario)
     result = {
         "example": "rllib_ppo",
@@ -164,12 +165,12 @@ def main() -> None:
         "evaluation": offtrack_sim.evaluate(offtrack_sim.Policy.load(file), args.benchmark, split=args.split).as_dict(),
         "curve": curve,
     }
-    write_json(args.out.with_suffix(".json"), result)
+    write_json(written(args, ".json"), result)
     algorithm.stop()
     ray.shutdown()
     found = result["evaluation"]
     print(f"{args.split} routes: {found['arrived']} of {found['episodes']} arrived, {found['success']:.1%}")
-    print(f"wrote {file} and {args.out.with_suffix('.json')}")
+    print(f"wrote {file} and {written(args, '.json')}")
 
 
 if __name__ == "__main__":

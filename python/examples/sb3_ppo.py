@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 import torch
-from results import about, write_json
+from results import about, prepare, write_json, written
 from stable_baselines3 import PPO
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
@@ -79,6 +79,7 @@ def arguments(description: str, *, benchmark: str, steps: int, envs: int, out: s
 
 def trucks(args: argparse.Namespace, gamma: float) -> VecNormalize:
     """The trucks to learn on, with rewards that a critic can fit."""
+    prepare(args)
     # Networks this small gain little from more threads, and wait for them on a busy machine.
     torch.set_num_threads(1)
     env = VecMonitor(RoundaboutVecEnv(args.scenario, args.envs, seed=args.seed))
@@ -93,8 +94,8 @@ def learn(example: str, model: BaseAlgorithm, curve: Curve, args: argparse.Names
         print("interrupted: what was learned is kept", flush=True)
     seconds = time.perf_counter() - curve.start
 
-    file = args.out.with_suffix(".safetensors")
-    model.save(args.out.with_suffix(".zip"))
+    file = written(args, ".safetensors")
+    model.save(written(args, ".zip"))
     export.save(file, model, scenario=args.scenario)
     result = {
         "example": example,
@@ -108,10 +109,10 @@ def learn(example: str, model: BaseAlgorithm, curve: Curve, args: argparse.Names
         "evaluation": offtrack_sim.evaluate(offtrack_sim.Policy.load(file), args.benchmark, split=args.split).as_dict(),
         "curve": curve.rows,
     }
-    write_json(args.out.with_suffix(".json"), result)
+    write_json(written(args, ".json"), result)
     found = result["evaluation"]
     print(f"{args.split} routes: {found['arrived']} of {found['episodes']} arrived, {found['success']:.1%}")
-    print(f"wrote {file}, {args.out.with_suffix('.zip')} and {args.out.with_suffix('.json')}")
+    print(f"wrote {file}, {written(args, '.zip')} and {written(args, '.json')}")
 
 
 def main() -> None:
