@@ -6,6 +6,7 @@ import enum
 import itertools
 import operator
 import os
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -78,7 +79,10 @@ def names_of(routes: Iterable[str]) -> list[str]:
 
 def names_of_values(values: Iterable[str]) -> list[str]:
     """Names of values as a list."""
-    names = [values] if isinstance(values, str) else list(itertools.islice(values, MOST_VALUES + 1))
+    try:
+        names = [values] if isinstance(values, str) else list(itertools.islice(values, MOST_VALUES + 1))
+    except TypeError:
+        raise TypeError(f"values: {values!r}; names of values are needed") from None
     if len(names) > MOST_VALUES:
         raise ValueError(f"values: more than {MOST_VALUES} names")
     return [text("values", name) for name in names]
@@ -89,6 +93,31 @@ def text(name: str, value: object) -> str:
     if not isinstance(value, str):
         raise TypeError(f"{name}: {value!r}; a text is needed")
     return value
+
+
+def check_once(name: str, indices: list[int]) -> None:
+    """An error where a truck is named twice."""
+    if len(set(indices)) < len(indices):
+        twice, _ = Counter(indices).most_common(1)[0]
+        raise ValueError(f"{name}: {twice} stands twice; a truck begins one episode at a time")
+
+
+def device_name(device: object) -> str:
+    """A device as the native part takes it."""
+    if text("device", device):
+        return str(device)
+    raise ValueError('device: \'\'; "cpu", "gpu" or part of an adapter\'s name is needed')
+
+
+def numbers(name: str, value: npt.ArrayLike, needed: str) -> npt.NDArray[Any]:
+    """The value as an array, if it is one of integers or real numbers."""
+    try:
+        found = np.asarray(value)
+    except (TypeError, ValueError):
+        found = np.array([""])
+    if found.dtype.kind not in "fiu":
+        raise TypeError(f"{name}: {type(value).__name__}; {needed}")
+    return found
 
 
 def check_length(name: str, given: Sequence[Any] | None, n: int) -> None:

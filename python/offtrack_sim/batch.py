@@ -13,10 +13,13 @@ import numpy.typing as npt
 from . import _offtrack
 from .arguments import (
     check_length,
+    check_once,
     checked_integer,
     checked_seed,
+    device_name,
     mode_name,
     names_of,
+    numbers,
     stream_of,
     text,
     weights_of,
@@ -72,6 +75,7 @@ class Batch(_offtrack.Batch):
             vehicle of a benchmark that has one is ``""``.
         vehicle_classes: Index into ``classes`` of each vehicle that episodes draw from, ``[n_vehicles]``: vehicles of
             one class differ where the benchmark draws dimensions.
+        split: Which split's routes these are; ``"routes"`` where some were named that are not all of one.
         split_routes: The same names in the benchmark's order. Episode ``e`` of ``episodes`` on its n-th route has the
             stream ``(seed, n * episodes + e)`` in an evaluation.
 
@@ -115,7 +119,7 @@ class Batch(_offtrack.Batch):
             seed=checked_seed(seed),
             autoreset=mode_name(autoreset),
             num_threads=threads,
-            device=text("device", device),
+            device=device_name(device),
             max_episode_steps=limit,
             weights=None if weights is None else weights_of(weights),
         )
@@ -262,6 +266,7 @@ class Batch(_offtrack.Batch):
         outside = next((env for env in indices if not 0 <= env < self.num_envs), None)
         if outside is not None:
             raise ValueError(f"envs: {outside}; the batch has trucks 0..{self.num_envs}")
+        check_once("envs", indices)
         if seeds is not None and streams is not None:
             raise ValueError("seeds, streams: give one of them")
         for name, values in {"seeds": seeds, "streams": streams, "routes": routes, "starts": starts}.items():
@@ -304,10 +309,7 @@ class Batch(_offtrack.Batch):
         and 15.9 m from all kerbs it stays. Off the road's field everything is solid, and the value falls with the
         distance from the field. The frame is that of :meth:`road`.
         """
-        try:
-            found = np.asarray(points, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise TypeError(f"points: {points!r}; numbers of shape (n, 2) are needed") from None
+        found = numbers("points", points, "numbers of shape (n, 2) are needed").astype(np.float64)
         if found.ndim != 2 or found.shape[1] != 2 or not np.isfinite(found).all():
             raise ValueError(f"points: {found.dtype} of shape {found.shape}; finite numbers of shape (n, 2) are needed")
         return self.kerb_distances(text("route", route), found)

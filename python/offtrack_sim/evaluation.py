@@ -11,11 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _offtrack
-from .arguments import check_commands, checked_integer, checked_seed, text
+from .arguments import check_commands, checked_integer, checked_seed, device_name, numbers
 from .batch import Batch
 from .layout import Ended
 from .policy import Policy
-from .scenarios import Scenario
+from .scenarios import Scenario, whole
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,8 @@ class Evaluation:
     scenario: str
     """Name of the benchmark."""
     split: str
-    """Routes of the benchmark."""
+    """Which routes of the benchmark: those of ``"train"``, ``"validation"`` or ``"test"``, or ``"routes"`` where some
+    were named that are not all of one split."""
     seed: int
     """Seed of the starts."""
     routes: list[str]
@@ -78,10 +79,10 @@ class Evaluation:
         Raises:
             TypeError, ValueError: For what are no finite numbers, or another number of them.
         """
-        try:
-            found = np.asarray(values, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise TypeError(f"values: {type(values).__name__}; a number for each episode is needed") from None
+        found = values if isinstance(values, np.ndarray) and values.dtype == np.bool_ else None
+        if found is None:
+            found = numbers("values", values, "a number for each episode is needed")
+        found = found.astype(np.float64)
         if found.shape not in (self.ended.shape, (self.ended.size,)) or not np.isfinite(found).all():
             needed = f"finite numbers of shape ({self.ended.size},) or {self.ended.shape} are needed"
             raise ValueError(f"values: {found.dtype} of shape {found.shape}; {needed}")
@@ -164,16 +165,29 @@ def evaluate(
     if per_route < 1:
         raise ValueError(f"episodes: {episodes}; must be at least 1")
     seed = checked_seed(seed)
-    batch = Batch(scenario, 1, split=split, routes=routes)
+    try:
+        batch = Batch(scenario, 1, split=split, routes=routes)
+    except ValueError:
+        _check_alone(scenario)
+        raise
     if isinstance(policy, Policy):
         policy.check(batch)
     if begins and isinstance(policy, Policy):
         raise ValueError("begins: True; a Policy remembers by itself: leave it out")
     chooser = _chooser(policy, batch.n_commands)
-    columns = dict(_offtrack.drive(batch, chooser, min(per_route, 2**62), seed, text("device", device), bool(begins)))
+    columns = dict(_offtrack.drive(batch, chooser, min(per_route, 2**62), seed, device_name(device), bool(begins)))
     names = batch.split_routes
     ended = columns["ended"].reshape(len(names), per_route)
-    return Evaluation(batch.scenario, split, seed, names, ended, _table(names, per_route, columns))
+    return Evaluation(batch.scenario, batch.split, seed, names, ended, _table(names, per_route, columns))
+
+
+def _check_alone(scenario: Scenario) -> None:
+    """An error where trucks share a road: as the command line has it."""
+    traffic = whole(scenario).keys.get("traffic")
+    group = traffic.get("group", 1) if isinstance(traffic, dict) else 1
+    if group != 1:
+        needed = "an evaluation drives trucks alone: leave the key out"
+        raise ValueError(f"scenario: traffic.group: {group}; {needed}")
 
 
 def _table(routes: list[str], per_route: int, columns: dict[str, npt.NDArray[Any]]) -> npt.NDArray[np.void]:

@@ -103,6 +103,8 @@ def save(
 
 def network(policy: Policy) -> Network:
     """The network of a policy, as arrays."""
+    if not isinstance(policy, Policy):
+        raise TypeError(f"policy: {policy!r}; a Policy is needed")
     return Network(**policy._network.parts())
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _offtrack
-from .arguments import checked_integer, names_of, within
+from .arguments import checked_integer, names_of, numbers, text, within
 from .scenarios import Scenario, given, kept
 
 Floats = npt.NDArray[np.float32]
@@ -227,15 +227,15 @@ class Observer(_offtrack.Observer):
 
     def frame(self, route: str) -> Frame:
         """Where the road of a route lies in its map."""
-        return Frame(*self.frame_of(route))
+        return Frame(*self.frame_of(text("route", route)))
 
     def waypoints(self, route: str) -> Doubles:
         """Position [m] and heading [rad] of a route's waypoints in the map's frame, ``[n_waypoints, 3]``."""
-        return self.waypoints_of(route)
+        return self.waypoints_of(text("route", route))
 
     def kerbs(self, route: str) -> list[Doubles]:
         """The kerbs of a route's road in the map's frame: closed lines ``[n, 2]`` [m], drivable on their left."""
-        return self.kerbs_of(route)
+        return self.kerbs_of(text("route", route))
 
     def dimensions(self, vehicle: tuple[str, str] | int | None = None) -> dict[str, float]:
         """Lengths [m], masses [kg], and limits (SI, rad) of one of ``vehicles``; of the first without a name.
@@ -293,6 +293,8 @@ def speed_control(observer: Observer, speed: Numbers, target: Numbers) -> Floats
     Raises:
         ValueError: For a speed that no truck can have; no controller has gone on then.
     """
+    if not isinstance(observer, Observer):
+        raise TypeError(f"observer: {observer!r}; an Observer is needed")
     n = (observer.num_trucks,)
     speeds = [_numbers(name, value, n).astype(np.float32) for name, value in (("speed", speed), ("target", target))]
     return observer.accelerations(*speeds)
@@ -318,12 +320,7 @@ def _vehicles(given: Sequence[tuple[str, str]] | Sequence[int] | None) -> tuple[
 
 def _numbers(name: str, value: npt.ArrayLike, shape: tuple[int, ...]) -> npt.NDArray[Any]:
     """Numbers of this shape: as many as are needed, or one for all."""
-    try:
-        numbers = np.asarray(value)
-        if not (np.issubdtype(numbers.dtype, np.floating) or np.issubdtype(numbers.dtype, np.integer)):
-            raise TypeError
-    except (TypeError, ValueError):
-        raise TypeError(f"{name}: {type(value).__name__}; numbers of shape {shape} are needed") from None
-    if numbers.shape == shape or numbers.shape == shape[1:]:
-        return np.broadcast_to(numbers, shape)
-    raise ValueError(f"{name}: shape {numbers.shape}; {shape} is needed")
+    found = numbers(name, value, f"numbers of shape {shape} are needed")
+    if found.shape == shape or found.shape == shape[1:]:
+        return np.broadcast_to(found, shape)
+    raise ValueError(f"{name}: shape {found.shape}; {shape} is needed")

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import copy
-import os
 from collections.abc import Iterable
 from typing import Any
 
 import gymnasium
 import numpy as np
 import numpy.typing as npt
-from pettingzoo import ParallelEnv
+
+try:
+    from pettingzoo import ParallelEnv
+except ImportError:
+    raise ImportError("parallel: pettingzoo is needed; pip install offtrack-sim[pettingzoo]") from None
 
 from .arguments import check_commands, checked_seed, names_of, within
 from .batch import Batch
 from .layout import Ended
-from .scenarios import Benchmark, Scenario, benchmark
+from .scenarios import Scenario, whole
 from .single import action_space, check_render_mode, frames_per_second, observation_space
 
 Observation = npt.NDArray[np.float32]
@@ -68,9 +71,7 @@ class RoundaboutParallel(ParallelEnv[str, Observation, Any]):
     ) -> None:
         check_render_mode(render_mode)
         n_trucks = within("n_trucks", n_trucks, 1, MOST_TRUCKS + 1)
-        if not isinstance(scenario, Benchmark):
-            is_named = isinstance(scenario, str | os.PathLike)
-            scenario = benchmark(scenario) if is_named else Benchmark(scenario)  # type: ignore[arg-type]
+        scenario = whole(scenario)
         if "traffic" not in scenario.keys:
             needed = (
                 "trucks share a road among other vehicles: a benchmark with a table [traffic] is needed, as traffic2026"

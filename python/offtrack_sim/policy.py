@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 from typing import TYPE_CHECKING, Any
 
@@ -9,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _offtrack
-from .arguments import checked_integer, file_name
+from .arguments import checked_integer, file_name, numbers
 from .layout import EXTRAS
 
 if TYPE_CHECKING:
@@ -107,6 +108,8 @@ class Policy:
             ValueError: Where the batch has other extras or another action table, or takes commands where the policy
                 chooses among actions; the message says which.
         """
+        if not hasattr(batch, "action_table"):
+            raise TypeError(f"batch: {batch!r}; a Batch or an Observer is needed")
         if self.head != "levels" and not batch.n_commands:
             raise ValueError(f"{self.name}: gives commands; {batch.scenario} has a table of actions")
         if self.head == "levels" and batch.n_commands:
@@ -172,7 +175,8 @@ class Policy:
 class Driver:
     """A policy that drives some trucks and remembers what each has observed; :meth:`Policy.driver` makes one.
 
-    What it gives for a truck depends on what that truck observed since its episode began, and on nothing else.
+    What it gives for a truck depends on what that truck observed since its episode began, and on nothing else. A copy
+    (``copy.copy``, ``copy.deepcopy``) remembers the same and goes on by itself.
     """
 
     def __init__(self, policy: Policy, native: _offtrack.Driver, n: int) -> None:
@@ -196,14 +200,21 @@ class Driver:
         """
         return self._native.act(_rows(observations), begins)
 
+    def __copy__(self) -> Driver:
+        # A copy that shared the memory would make this one remember what the copy observes.
+        return Driver(self.policy, self._native.copied(), self.n)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Driver:
+        return copy.copy(self)
+
+    def __reduce__(self) -> str:
+        raise TypeError("Driver: what it remembers cannot be pickled; copy.copy copies it, Policy.driver begins anew")
+
     def __repr__(self) -> str:
         return f"Driver({self.policy.name!r}, {self.n})"
 
 
 def _rows(observations: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
     """Observations as the network takes them."""
-    try:
-        return np.ascontiguousarray(observations, dtype=np.float32)
-    except (TypeError, ValueError):
-        kind = type(observations).__name__
-        raise TypeError(f"observations: {kind}; an array of numbers, [n, n_values], is needed") from None
+    found = numbers("observations", observations, "an array of numbers, [n, n_values], is needed")
+    return np.ascontiguousarray(found, dtype=np.float32)

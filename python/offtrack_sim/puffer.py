@@ -8,7 +8,11 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import pufferlib
+
+try:
+    import pufferlib
+except ImportError:
+    raise ImportError("puffer: pufferlib 3 is needed; pip install 'pufferlib>=3,<4'") from None
 
 from .arguments import checked_seed
 from .batch import Batch, Bools

@@ -9,7 +9,11 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from stable_baselines3.common.vec_env import VecEnv
+
+try:
+    from stable_baselines3.common.vec_env import VecEnv
+except ImportError:
+    raise ImportError("sb3: stable-baselines3 is needed; pip install offtrack-sim[sb3]") from None
 
 from .arguments import checked_seed
 from .batch import Batch, Bools

@@ -81,6 +81,8 @@ class Benchmark:
             KeyError: For a table or an index that there is not.
             TypeError, ValueError: For values as above.
         """
+        if not isinstance(changes, Mapping):
+            raise TypeError(f"changes: {changes!r}; a dict of a value for each key is needed")
         keys = self.keys
         for key, value in changes.items():
             _change(keys, text("key", key), value)
@@ -143,12 +145,24 @@ def kept(scenario: Scenario) -> str | Benchmark:
     return os.path.abspath(source) if _is_file(source) else source
 
 
+def whole(scenario: Scenario) -> Benchmark:
+    """The same as a benchmark in memory."""
+    if isinstance(scenario, Benchmark):
+        return scenario
+    return Benchmark(scenario) if isinstance(scenario, Mapping) else benchmark(scenario)
+
+
 def _source(scenario: str | os.PathLike[str]) -> str:
+    needed = "the name of a benchmark, the path of its file, a Benchmark or a dict of its keys is needed"
     try:
-        return text("scenario", os.fspath(scenario))
+        source = text("scenario", os.fspath(scenario))
     except TypeError:
-        needed = "the name of a benchmark, the path of its file, a Benchmark or a dict of its keys is needed"
         raise TypeError(f"scenario: {scenario!r}; {needed}") from None
+    try:
+        source.encode()
+    except UnicodeEncodeError:
+        raise ValueError(f"scenario: {scenario!r} is no UTF-8; {needed}") from None
+    return source
 
 
 def _is_file(source: str) -> bool:

@@ -130,6 +130,8 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], Any]):
             check_commands("action", command)
             return command[None].astype(np.float32)
         try:
+            if isinstance(action, bool | np.bool_):
+                raise TypeError
             index = operator.index(action)
         except TypeError:
             raise TypeError(f"action: {action!r}; an integer is needed") from None

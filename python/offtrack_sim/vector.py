@@ -136,6 +136,7 @@ class RoundaboutVector(Base):
             streams = [None if self._has_begun else (self._seed, env) for env in envs]
         elif not isinstance(seed, Sequence | np.ndarray) or getattr(seed, "ndim", 1) == 0:
             whole = checked_seed(seed)  # type: ignore[arg-type]
+            super().reset(seed=whole)
             streams = [(whole, env) for env in envs]
         else:
             if isinstance(seed, str):

@@ -7,6 +7,7 @@ use std::sync::{Mutex, MutexGuard, TryLockError};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use offtrack::layout::Ended;
 use offtrack::observer::{self, State};
+use offtrack::scenario::Split;
 use offtrack::simulator::{Actions, Error};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -58,7 +59,8 @@ impl Observer {
             let mut names = routes.clone();
             names.sort_unstable();
             names.dedup();
-            let asked = Asked { scenario: &scenario, split: "", routes: Some(&names), max_episode_steps: None };
+            let split = Split::Test.name();
+            let asked = Asked { scenario: &scenario, split, routes: Some(&names), max_episode_steps: None };
             let mut pool = Pool::new(num_threads);
             let find = if rows.is_some() { Place::find } else { Place::typical };
             let place = pool.run_until_signal(py, |stop| find(&asked, stop))??;

@@ -118,6 +118,12 @@ def batch_of_two() -> Any:
     return Batch(num_envs=2)
 
 
+def begun() -> Any:
+    env = sim.Roundabout()
+    env.reset(seed=1)
+    return env
+
+
 @pytest.mark.parametrize(
     ("call", "name"),
     [
@@ -139,6 +145,15 @@ def batch_of_two() -> Any:
         (lambda: batch_of_two().restore(3), "state"),
         (lambda: batch_of_two().columns(3), "column"),
         (lambda: batch_of_two().render(0.5), "env"),
+        (lambda: batch_of_two().kerb_distance("16m/N-left-3", [["1", "2"]]), "points"),
+        (lambda: sim.Policy.shipped().act([["0"] * 69]), "observations"),
+        (lambda: sim.Policy.shipped().act(np.zeros((1, 69), complex)), "observations"),
+        (lambda: sim.Policy.shipped().check("attard2023"), "batch"),
+        (lambda: sim.export.to_onnx(None, "a.onnx"), "policy"),
+        (lambda: sim.export.save("a", layers(((69, 9), 9)), values=5), "values"),
+        (lambda: sim.speed_control(None, 8.0, 8.0), "observer"),
+        (lambda: sim.benchmark("attard2023").changed([1]), "changes"),
+        (lambda: begun().step(True), "action"),
         (lambda: sim.Policy.load(3), "file"),
         (lambda: sim.Policy.shipped(3), "name"),
         (lambda: sim.Policy.shipped().act("left"), "observations"),
@@ -167,6 +182,26 @@ def batch_of_two() -> Any:
 )
 def test_a_value_of_a_wrong_type_is_refused_by_the_arguments_name(call: Callable[[], Any], name: str) -> None:
     with pytest.raises(TypeError, match=f"^{name}: .* needed"):
+        call()
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: batch_of_two().begin([0, 0], seeds=[1, 2]), "envs: 0 stands twice"),
+        (lambda: sim.Batch(device=""), 'device: \'\'; "cpu", "gpu" or'),
+        (lambda: sim.Batch("\ud800"), "scenario: .* is no UTF-8"),
+        (lambda: sim.Batch(routes=["16m"], split="tset"), 'split: "tset"; must be one of train, '),
+        (
+            lambda: sim.evaluate(
+                sim.Policy.shipped("traffic2026"), sim.benchmark("traffic2026").changed({"traffic.group": 4})
+            ),
+            "scenario: traffic.group: 4; an evaluation drives trucks alone: leave the key out",
+        ),
+    ],
+)
+def test_a_value_that_cannot_be_is_refused_by_the_arguments_name(call: Callable[[], Any], message: str) -> None:
+    with pytest.raises(ValueError, match=f"^{message}"):
         call()
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import pickle
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -63,12 +65,27 @@ def test_recurrent_layers_do_what_pytorch_documents_and_begin_anew_where_an_epis
 
 def test_a_copy_of_a_policy_with_a_memory_drives_as_it_does(tmp_path: Path) -> None:
     policy, _ = remembering(tmp_path, GRU)
-    copy = pickle.loads(pickle.dumps(policy))
-    drivers = policy.driver(9), copy.driver(9)
+    again = pickle.loads(pickle.dumps(policy))
+    drivers = policy.driver(9), again.driver(9)
     for observation in observed(6, 9):
         one, other = (driver.act(observation) for driver in drivers)
         assert (one == other).all()
-    assert copy.values == RAYS and copy.frames == 2
+    assert again.values == RAYS and again.frames == 2
+
+
+@pytest.mark.parametrize("way", [copy.copy, copy.deepcopy])
+def test_a_copied_driver_remembers_the_same_and_goes_on_by_itself(way: Callable[[Any], Any], tmp_path: Path) -> None:
+    policy, _ = remembering(tmp_path, GRU)
+    driver, undisturbed = policy.driver(9), policy.driver(9)
+    elsewhere = np.zeros((9, 69), np.float32)
+    for observation in observed(12, 9):
+        branch = way(driver)
+        branch.act(elsewhere)
+        same = way(driver)
+        actions = driver.act(observation)
+        assert (actions == undisturbed.act(observation)).all() and (actions == same.act(observation)).all()
+    with pytest.raises(TypeError, match="^Driver: what it remembers cannot be pickled"):
+        pickle.dumps(driver)
 
 
 def test_a_policy_with_a_memory_drives_by_a_driver_alone(tmp_path: Path) -> None:

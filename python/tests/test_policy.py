@@ -33,6 +33,14 @@ def test_an_evaluation_counts_what_the_command_line_counts() -> None:
     assert found.counts == reported["ended"]
 
 
+def test_named_routes_are_reported_as_those_of_their_split() -> None:
+    splits = {("16m/N-left-3",): "train", ("20m",): "test", ("16m/N-left-3", "20m/E-left-2"): "routes"}
+    for routes, split in splits.items():
+        found = evaluate(Policy.shipped(), routes=routes, episodes=1)
+        assert (found.split, found.as_dict()["split"]) == (split, split)
+        assert str(found).startswith(f"attard2023 {split}: ")
+
+
 def test_any_function_is_evaluated() -> None:
     found = evaluate(lambda observations: np.full(len(observations), 4), routes=["16m"], episodes=2)
     assert found.success == 0.0 and sum(found.counts.values()) == found.ended.size == 38

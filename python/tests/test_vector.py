@@ -116,6 +116,7 @@ def test_an_int_seed_is_the_batch_of_that_seed_and_none_goes_on() -> None:
     env = offtrack_sim.make_vec(num_envs=5)
     batch = offtrack_sim.Batch(num_envs=5, seed=11)
     first, infos = env.reset(seed=11)
+    assert env.np_random_seed == 11
     assert (first == batch.observation()).all()
     assert infos["_route"].all() and infos["route"][2] == batch.route_names[batch.routes()[2]]
     second, _ = env.reset()

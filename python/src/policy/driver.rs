@@ -48,6 +48,14 @@ impl Driver {
             chosen(py, driver.policy(), outputs)
         })
     }
+
+    /// Another one that remembers the same.
+    fn copied(&self, py: Python) -> Driver {
+        use pyo3::sync::MutexExt;
+
+        let inner = self.inner.lock_py_attached(py).unwrap_or_else(|poisoned| poisoned.into_inner());
+        Driver { n: self.n, inner: Mutex::new((inner.0.clone(), Pool::new(0))) }
+    }
 }
 
 impl Driver {

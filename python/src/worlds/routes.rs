@@ -16,11 +16,11 @@ const LONGEST_NAME: usize = 100;
 /// Leaves the scenario the routes of a split, or those of any split that `names` has: each a route, or all routes of a
 /// roundabout. One that the benchmark does not have is added, as `wide/7/12` is.
 pub fn narrow(scenario: &mut Scenario, split: &str, names: Option<&[String]>) -> PyResult<()> {
+    let Some(split) = Split::ALL.into_iter().find(|known| known.name() == split) else {
+        let known = Split::ALL.map(Split::name).join(", ");
+        return Err(PyValueError::new_err(format!("split: {split:?}; must be one of {known}")));
+    };
     let Some(names) = names else {
-        let Some(split) = Split::ALL.into_iter().find(|known| known.name() == split) else {
-            let known = Split::ALL.map(Split::name).join(", ");
-            return Err(PyValueError::new_err(format!("split: {split:?}; must be one of {known}")));
-        };
         if scenario.split(split).is_empty() {
             let has = Split::ALL.into_iter().filter(|&split| !scenario.split(split).is_empty()).map(Split::name);
             let has = has.collect::<Vec<_>>().join(", ");
