@@ -129,10 +129,11 @@ impl<'a> Run<'a> {
         self.count_episodes(true)
     }
 
-    /// Whether the run has come to its refinement.
+    /// Whether the run has come to its refinement, which lasts until its end: with a larger budget too.
     fn is_refinement_due(&self) -> bool {
         let begin = self.config.refinement.as_ref().map(|refinement| refinement.begin);
-        begin.is_some_and(|begin| begin <= self.progress.fraction()) && self.training.is_acting()
+        let is_time = begin.is_some_and(|begin| begin <= self.progress.fraction());
+        self.training.is_refining() || (is_time && self.training.is_acting())
     }
 
     /// An iteration of the refinement, which begins with the best policy so far.
@@ -141,7 +142,7 @@ impl<'a> Run<'a> {
         if !self.training.is_refining() {
             self.training.begin_refinement(&self.policy()?)?;
         }
-        let done = (self.progress.fraction() - settings.begin) / (1.0 - settings.begin);
+        let done = ((self.progress.fraction() - settings.begin) / (1.0 - settings.begin)).max(0.0);
         let n_updates = self.training.refine(1.0 - (1.0 - settings.final_learning_rate_fraction) * done)?;
         self.progress.stepped((self.config.n_envs * settings.n_steps) as u64);
         self.progress.updated(n_updates);

@@ -87,7 +87,7 @@ pub struct Transitions {
 /// Losses and figures of an update, averaged over its batch; or sums of them over several updates.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Update {
-    /// Squared TD errors of the two critics, summed.
+    /// Squared TD errors of the two critics, weighted by importance, summed.
     pub critic_loss: f32,
     /// Entropy coefficient times negative entropy, minus value: what the actor minimises.
     pub actor_loss: f32,

@@ -72,6 +72,7 @@ fn add(hasher: &mut Hasher, Field { origin, cells_per_metre, columns, rows, cell
 mod tests {
     use crate::files::cache::Loading;
     use crate::scenario::Scenario;
+    use crate::traffic::{Demand, Mix};
     use crate::world::Traffic;
 
     use super::*;
@@ -133,8 +134,9 @@ mod tests {
             ("group", |traffic| traffic.group = 2),
             ("networks", |traffic| traffic.roads[1].network.paths[2].line += 1),
             ("demands", |traffic| {
-                let other = traffic.roads[0].levels[0].demand.clone();
-                traffic.roads[1].levels[0].demand = other;
+                let network = &traffic.roads[1].network;
+                let flows = Demand::even(network, 700.0);
+                traffic.roads[1].levels[0].demand = Demand::new(network, &flows, Mix::default()).unwrap();
             }),
             ("snapshots", |traffic| traffic.roads[1].levels[0].snapshots[3].backlog[0] += 1),
             ("paths of routes", |traffic| traffic.routes[3].path += 1),

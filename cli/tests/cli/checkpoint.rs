@@ -4,7 +4,7 @@
 use serde_json::Value;
 
 use crate::place::{refusal, succeed};
-use crate::resume::{ENDLESS, bytes, place, resume};
+use crate::resume::{ENDLESS, begun, bytes, interrupted, place, refine, resume, resumed, wait_until};
 
 /// A checkpoint with its column `name` changed, and the checksum that goes with it: as a program with a fault would
 /// have written it.
@@ -110,4 +110,25 @@ fn a_checkpoint_that_a_run_fails_by_is_not_called_the_last_good_one() {
     );
     assert!(!message.contains("last good"), "{message}");
     assert!(bytes(&place, file) == damaged);
+}
+
+#[test]
+fn a_refined_run_that_goes_on_is_refined_from_the_first_step_on() {
+    let place = place();
+    refine(&place);
+    succeed(&place.train(&["--name", "run", "--steps", "12000"]));
+    let newest = || {
+        let files = std::fs::read_dir(place.file("runs/run/policies")).unwrap();
+        let names = files.map(|file| file.unwrap().file_name().into_string().unwrap());
+        names.filter(|name| name.ends_with(".safetensors")).max().unwrap()
+    };
+    let policy = |name: &str| bytes(&place, &format!("runs/run/policies/{name}"));
+    let (before, known) = (newest(), policy(&newest()));
+    // The next policy is kept at a twentieth of the new budget, long before a refinement would begin.
+    let run = begun(resumed(&place, "run", &["--steps", "600000"]));
+    wait_until("a later policy", || before < newest());
+    succeed(&interrupted(run));
+    assert!(newest().as_str() < "000000150000" && policy(&newest()) != known, "{before} {}", newest());
+    let message = refusal(&resume(&place, "run", &["--steps", "10"]), 2);
+    assert!(message.contains("--steps 10: steps: 10; must be "), "{message}");
 }

@@ -25,6 +25,17 @@ pub fn place() -> Place {
     place
 }
 
+/// Lets runs end with a refinement, from a quarter on.
+pub fn refine(place: &Place) {
+    let refinement = "[refinement]\nbegin = 0.25\nn_steps = 8\nepochs = 2\nbatch = 32\ngamma = 0.97\n\
+                      gae_lambda = 0.9\nclip = 0.2\nadvantage_limit = 4.0\nentropy_coefficient = 0.003\n\
+                      actor_learning_rate = 3e-4\ncritic_learning_rate = 1e-3\nfinal_learning_rate_fraction = 0.1\n\
+                      actor_ema_rate = 0.1\ncritic_iterations = 4\nclearance_power = 2.0\n\
+                      reward = { waypoint = 0.0, clearance_limit = 0.5 }\n";
+    let training = std::fs::read_to_string(place.file("tiny.toml")).unwrap();
+    std::fs::write(place.file("tiny.toml"), format!("{training}\n{refinement}")).unwrap();
+}
+
 pub fn resumed(place: &Place, run: &str, arguments: &[&str]) -> Command {
     let mut command = program();
     command.args(["train", "--resume", &place.text(&format!("runs/{run}"))]).args(arguments);
@@ -102,15 +113,7 @@ pub fn wait_until(what: &str, reached: impl Fn() -> bool) {
 #[test]
 fn a_refinement_stopped_on_the_way_equals_one_never_stopped_bit_for_bit_and_its_last_policy_is_kept() {
     let place = place();
-    let refinement = "[refinement]\nbegin = 0.25\nn_steps = 8\nepochs = 2\nbatch = 32\ngamma = 0.97\n\
-                      gae_lambda = 0.9\nclip = 0.2\n\
-                      advantage_limit = 4.0\nentropy_coefficient = 0.003\nactor_learning_rate = 3e-4\n\
-                      critic_learning_rate = 1e-3\n\
-                      final_learning_rate_fraction = 0.1\nactor_ema_rate = 0.1\ncritic_iterations = 4\n\
-                      clearance_power = 2.0\n\
-                      reward = { waypoint = 0.0, clearance_limit = 0.5 }\n";
-    let training = std::fs::read_to_string(place.file("tiny.toml")).unwrap();
-    std::fs::write(place.file("tiny.toml"), format!("{training}\n{refinement}")).unwrap();
+    refine(&place);
     let steps = ["--steps", "60000"];
     succeed(&place.train(&[&["--name", "whole"], &steps[..]].concat()));
     let run = begun(place.training(&[&["--name", "parts"], &steps[..]].concat()));

@@ -49,6 +49,7 @@ impl Resumed {
         let metrics = if file.is_file() { MetricsFile::open(file)? } else { MetricsFile::create(file)? };
         if !folder.checkpoint().is_file() {
             config.override_with(None, minutes, steps, None)?;
+            check_budget(&config, steps)?;
             return Ok(Resumed { folder, config, metrics, stored: None, has_new_budget });
         }
         let stored = Stored::read(&folder.checkpoint())?;
@@ -60,6 +61,7 @@ impl Resumed {
             return Err(Error::contents(&folder.config(), message));
         }
         config.override_with(None, minutes, steps, None)?;
+        check_budget(&config, steps)?;
         let (seconds, env_steps) = progress::reached(&stored)?;
         let over = config.minutes.is_some_and(|minutes| 60.0 * minutes <= seconds)
             || config.steps.is_some_and(|steps| steps <= env_steps);
@@ -80,6 +82,11 @@ impl Resumed {
 
 fn refused(path: &Path, expected: String) -> Error {
     Error::setting("--resume", path.display().to_string(), expected)
+}
+
+/// An error if this number of steps is asked for and nothing would be learned in it.
+fn check_budget(config: &Config, steps: Option<u64>) -> Result<(), Error> {
+    steps.map_or(Ok(()), |steps| config.check_budget(Path::new(&format!("--steps {steps}"))))
 }
 
 /// The final evaluation has been written.

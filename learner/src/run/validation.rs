@@ -47,7 +47,7 @@ pub struct Validations {
     pub routes: usize,
     /// Episodes in each validation.
     pub episodes: u64,
-    /// Validations made.
+    /// Validations that came due; of several at once one was made.
     pub times: u64,
     /// The best validation, whose policy is kept; of equal ones the last, and of a refinement the last.
     pub best: Validated,
@@ -67,7 +67,7 @@ pub struct Validation {
     world: Arc<World>,
     /// CRC-32 of the world.
     fingerprint: u32,
-    /// Validations made.
+    /// Validations that came due and are over.
     n_made: u64,
     last: Option<Validated>,
     best: Option<(Validated, Vec<u8>)>,

@@ -132,7 +132,7 @@ fn closed(reader: &Reader, drawn: Vec<Entity>, layer: &str, notes: &mut Vec<Stri
 /// The centre and the radius of the central island.
 fn island(reader: &Reader, loops: &[Curve], layers: &Layers, near: Option<DVec2>) -> Result<(DVec2, f64), Error> {
     let outer = (0..loops.len()).max_by(|&a, &b| loops[a].signed_area().abs().total_cmp(&loops[b].signed_area().abs()));
-    let circle = |curve: &Curve| fitted_circle(&densified(&curve.polyline(0.002), 0.25));
+    let circle = |curve: &Curve| fitted_circle(&densified(&curve.polyline(1e-5), 0.25));
     let islands = loops.iter().enumerate().filter(|(index, _)| Some(*index) != outer);
     let round = islands.filter_map(|(_, curve)| circle(curve)).filter(|(_, radius, off)| *off < ROUND * radius);
     let nearest = |one: &(DVec2, f64, f64)| near.map_or(-one.1, |ring| ring.distance(one.0));

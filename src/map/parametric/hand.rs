@@ -58,5 +58,28 @@ pub(super) fn as_written(error: Error) -> Error {
         part => part.to_owned(),
     };
     let key = key.split('.').map(swapped).collect::<Vec<_>>().join(".");
+    let (value, expected) = (lanes_swapped(&value), lanes_swapped(&expected));
     Error::Invalid { file, key, value, expected: format!("{expected} ({MIRRORED})") }
+}
+
+/// A message in which each lane has the name of the other side: a direction, as in "left of", stays.
+fn lanes_swapped(message: &str) -> String {
+    let pairs = [("entry.left", "entry.right"), ("exit.left", "exit.right"), ("left lane", "right lane")];
+    pairs.iter().fold(message.to_owned(), |message, (left, right)| {
+        let parts: Vec<String> = message.split(left).map(|part| part.replace(right, left)).collect();
+        parts.join(right)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lanes_of_a_message_change_their_names_and_directions_stay() {
+        let message = "4 m left of entry.left, right of exit.right: left lanes, the right lane's, to the left";
+        let swapped = "4 m left of entry.right, right of exit.left: right lanes, the left lane's, to the left";
+        assert_eq!(lanes_swapped(message), swapped);
+        assert_eq!(lanes_swapped(swapped), message);
+    }
 }
