@@ -20,7 +20,7 @@
 # BUILT_AT         path of this repository when the programs were built: the tests read its files there, so the script
 #                  makes a link at that path if nothing is there
 # OFFTRACK_COMMIT  the commit that the programs were built from, for the results, where git cannot tell
-# ADAPTER          part of an adapter's name, see `offtrack devices`
+# ADAPTER          part of an adapter's name, see `offtrack devices`; the tests take the first adapter
 # FILTER           test name filters separated by spaces, such as `device parity`; without it all tests run
 # TRAINING_OPTIONS more options for the training run, such as `--set replay_buffer.capacity=100000` for an adapter with
 #                  little memory
@@ -116,7 +116,7 @@ scale random-one-a-submission 30 "$fewer" --submission 1
 [[ $modes == *training* ]] && config=(--config "$training")
 scale networks 80 "$fewer" --mode "$modes" "${config[@]}"
 scale many-roads 60 "$fewer" --benchmark "$many"
-part training 100 "$offtrack" train "$training" --minutes "$minutes" --out "$out" --name training "${options[@]}"
+part training 100 "$offtrack" train "$training" "${adapter[@]}" --minutes "$minutes" --out "$out" --name training "${options[@]}"
 [ -n "$smi" ] && kill "$smi"
 part joined 20 python3 benches/on_a_gpu.py "$out"
 

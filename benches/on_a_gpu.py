@@ -79,7 +79,7 @@ def training(folder):
     if not path.is_file():
         return None
     report = json.loads(path.read_text())
-    sets = [{key: row[key] for key in SET} for row in (report["evaluation"], *report.get("also", ()))]
+    sets = [{key: row[key] for key in SET} for row in (report["evaluation"], *report.get("also", ())) if row]
     return {key: report[key] for key in RUN if key in report} | {"evaluations": sets}
 
 
