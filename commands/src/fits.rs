@@ -172,7 +172,7 @@ impl Work<'_> {
         let shown = shown.collect::<Result<Vec<Shown>, Error>>()?;
         let head = Head {
             vehicles: self.vehicles,
-            assumptions: &results.assumptions,
+            assumptions: &results.assumptions_in(self.args.units()),
             clearance: self.asked.clearance,
             units: self.args.units(),
             gutter: self.asked.gutter,

@@ -36,9 +36,18 @@ impl Lettering {
 
     /// Width of `words` in text of `size` (px).
     pub fn width(&self, words: &str, size: f64) -> f64 {
-        let advance =
-            |letter| self.face.glyph_index(letter).and_then(|glyph| self.face.glyph_hor_advance(glyph)).unwrap_or(0);
-        words.chars().map(|letter| f64::from(advance(letter))).sum::<f64>() * self.scale(size)
+        let advance = |glyph| self.face.glyph_hor_advance(glyph).unwrap_or(0);
+        self.glyphs(words).map(|glyph| f64::from(advance(glyph))).sum::<f64>() * self.scale(size)
+    }
+
+    /// The glyphs of a text: a box, the typeface's own, for what it has no letter for, and nothing for marks that only
+    /// say how the letters beside them join.
+    fn glyphs(&self, words: &str) -> impl Iterator<Item = GlyphId> {
+        let joins = |letter: char| matches!(letter, '\u{200b}'..='\u{200f}' | '\u{2060}' | '\u{fe0f}');
+        words.chars().filter(move |&letter| !joins(letter)).map(|letter| {
+            // The first glyph of every typeface is that box.
+            self.face.glyph_index(letter).unwrap_or(GlyphId(0))
+        })
     }
 
     /// The size in which words are at most `width` wide, `largest` at most (px).
@@ -90,7 +99,7 @@ impl Lettering {
     /// The glyphs of one line of text, each with the left end of its base line (px).
     pub fn placed(&self, words: &str, at: DVec2, size: f64, align: Align) -> impl Iterator<Item = (GlyphId, DVec2)> {
         let mut at = self.left(words, at, size, align);
-        words.chars().filter_map(|letter| self.face.glyph_index(letter)).map(move |glyph| {
+        self.glyphs(words).map(move |glyph| {
             let left = at;
             at.x += f64::from(self.face.glyph_hor_advance(glyph).unwrap_or(0)) * self.scale(size);
             (glyph, left)

@@ -9,6 +9,7 @@ use offtrack::vehicle::Vehicle;
 use serde::{Deserialize, Serialize};
 
 use super::row::Row;
+use super::table::Units;
 use crate::error::Error;
 use crate::{files, provenance};
 
@@ -66,11 +67,18 @@ impl Results {
             commit: provenance::commit(),
             date,
             machine: provenance::machine(),
-            assumptions: assumptions(&asked),
+            assumptions: assumptions(&asked, Units::Metric),
             asked,
             inputs: BTreeMap::new(),
             rows: Vec::new(),
         }
+    }
+
+    /// What the figures assume, in these units.
+    pub fn assumptions_in(&self, units: Units) -> Vec<String> {
+        let general = assumptions(&self.asked, units);
+        let of_roads = self.assumptions.get(general.len()..).unwrap_or_default();
+        [general, of_roads.to_vec()].concat()
     }
 
     /// Notes a road, whose results another shape of it would not have.
@@ -130,11 +138,6 @@ impl Results {
         self.rows.iter().find(|row| row.route == route && row.vehicle == vehicle)
     }
 
-    /// Whether everything that is asked fits.
-    pub fn all_fit(&self) -> bool {
-        self.rows.iter().all(|row| row.fits)
-    }
-
     /// Writes the results, a line for each row, whole or not at all.
     ///
     /// # Errors
@@ -153,15 +156,22 @@ impl Results {
 }
 
 /// What the figures assume, in a road designer's words.
-fn assumptions(asked: &Asked) -> Vec<String> {
+fn assumptions(asked: &Asked, units: Units) -> Vec<String> {
     let gutter = match asked.gutter {
         Gutter::Drivable => "gutters may be driven on",
         Gutter::Solid => "gutters may not be driven on",
     };
+    let [speed, clearance] = match units {
+        Units::Metric => [format!("{} km/h", asked.speed_kmh), format!("{} m", asked.clearance)],
+        Units::Feet => [
+            format!("{} {}", units.speed(asked.speed_kmh), units.of_speed()),
+            format!("{} {}", units.length(asked.clearance), units.of_length()),
+        ],
+    };
     vec![
-        format!("constant speed {} km/h, from the start on", asked.speed_kmh),
+        format!("constant speed {speed}, from the start on"),
         format!("load {}; the trailer starts in line with the tractor", asked.load),
-        format!("both units keep {} m from every kerb; {gutter}", asked.clearance),
+        format!("both units keep {clearance} from every kerb; {gutter}"),
         "wheels turn while driving, at the vehicle's steering rate and up to its lock".to_owned(),
         "on the lane's centre line the front axle follows it exactly, whatever the steering rate".to_owned(),
         "level road, no other traffic; the vehicle's outline is two rectangles at any height".to_owned(),

@@ -43,14 +43,14 @@ impl Units {
         }
     }
 
-    fn speed(self, kmh: f64) -> String {
+    pub(super) fn speed(self, kmh: f64) -> String {
         match self {
             Units::Metric => format!("{kmh:.0}"),
             Units::Feet => format!("{:.0}", kmh / MILE),
         }
     }
 
-    fn of_speed(self) -> &'static str {
+    pub(super) fn of_speed(self) -> &'static str {
         match self {
             Units::Metric => "km/h",
             Units::Feet => "mph",
