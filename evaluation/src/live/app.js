@@ -171,6 +171,13 @@ class App {
     this.name();
   }
 
+  /** Forgets the last world, on which trucks do not drive. */
+  forgetWorld(index) {
+    this.live.facts.worlds.pop();
+    this.gpu.worlds.splice(index);
+    showChoices(this);
+  }
+
   /** The first crowd drives by another policy, and all trucks begin again from the same seed. The view stays. */
   async driveBy(index) {
     const { crowds, policies, visit } = this, [first, ...others] = crowds;

@@ -109,9 +109,7 @@ class Baker {
       await this.app.choose({ world: index });
     } catch (error) {
       // There may be no room for it.
-      this.live.facts.worlds.pop();
-      this.app.gpu.worlds.splice(index);
-      showChoices(this.app);
+      this.app.forgetWorld(index);
       throw error;
     }
   }

@@ -191,6 +191,6 @@ function chosenByAddress(facts) {
   const { roads, splits } = facts.worlds[chosen.world ?? 0];
   const road = roads.findIndex(({ name }) => name === asked.get("road"));
   if (0 <= road) chosen.road = road;
-  else if (splits[asked.get("road")]) chosen.road = asked.get("road");
+  else if (Object.hasOwn(splits, asked.get("road"))) chosen.road = asked.get("road");
   return chosen;
 }

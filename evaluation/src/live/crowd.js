@@ -6,6 +6,9 @@ const MOST_STEPS = 1024;
 const AVERAGED = 3000;
 
 class Crowd {
+  /** Policies that crowds have taken. */
+  static taken = 0;
+
   /** A crowd on `world` driven by `policy`; `routes` are those that trucks draw from. */
   static async open({ picture, gpu, world, sites, options, policy }) {
     const made = new Crowd(), batch = await Batch.open(gpu, world, options);
@@ -27,6 +30,7 @@ class Crowd {
     });
     // Episodes that the visitor drove, at least in part: "truck/episode".
     Object.assign(this, { policy, driven: new Set(), tally: null, failures: [], moments: [] });
+    this.taken = Crowd.taken += 1;
   }
 
   /** All trucks begin again by this policy, from the same seed. */

@@ -20,7 +20,12 @@ async function takeFile(app, name, bytes) {
   if (isWorldFile(app.live, bytes)) {
     const index = await app.live.addWorld(name, bytes);
     app.live.facts.worlds[index].file = name;
-    await app.choose({ world: index });
+    try {
+      await app.choose({ world: index });
+    } catch (error) {
+      app.forgetWorld(index);
+      throw error;
+    }
     return `Trucks drive on ${name} now.`;
   }
   const policy = policyOf(app.live, name, bytes);

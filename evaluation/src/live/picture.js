@@ -61,7 +61,7 @@ class Picture {
   /** The pipeline of a layer; the layouts of two batches are alike. */
   async pipeline(name, layout) {
     if (!this.pipelines.has(name)) {
-      const [vertex, fragment] = LAYERS[name] ?? VEHICLES[name];
+      const [vertex, fragment] = LAYERS[name] ?? VEHICLES[name] ?? TRAILERS[name];
       const factors = { srcFactor: "one", dstFactor: "one-minus-src-alpha" };
       const { code } = this.live, module = await this.gpu.module("view", code.picture + code.view);
       this.pipelines.set(name, this.device.createRenderPipelineAsync({

@@ -75,9 +75,11 @@ class FailureList {
     const all = crowds.flatMap((crowd) => crowd.failures.map((failure) => ({ crowd, failure }))).slice(0, MOST_LISTED);
     const count = crowds.reduce((sum, { tally }) => sum + failuresOf(tally), 0);
     byId("failures-count").textContent = count === 0 ? "none yet" : whole(count);
-    const key = all.map(({ failure }) => `${failure.env}/${failure.episode}`).join(" ") + crowds.length;
-    if (key === this.key || byId("failures").contains(document.activeElement)) return;
-    this.key = key;
+    const who = crowds.map(({ taken }) => taken).join("/");
+    const key = `${who} ${all.map(({ failure }) => `${failure.env}/${failure.episode}`).join(" ")}`;
+    // An entry that has the focus stays where it is, unless its crowd is gone.
+    if (key === this.key || (who === this.who && byId("failures").contains(document.activeElement))) return;
+    Object.assign(this, { key, who });
     byId("failures").replaceChildren(...all.map(({ crowd, failure }) => {
       const { ended, route, env, episode } = failure, { name } = crowd.world.facts.routes[route];
       const onclick = () => this.open(crowd, failure);

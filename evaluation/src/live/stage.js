@@ -21,8 +21,9 @@ class Stage {
     byId("pane-labels").replaceChildren(...(crowds.length < 2 ? [] : [html("i"), ...crowds.map(({ policy }, n) =>
       html("span", { style: `left: calc(${(100 * n) / crowds.length}% + 12px)` }, policyWords(policy)))]));
     const named = crowds.flatMap((crowd, pane) => crowd.picture.sites.places.map((place) => ({ pane, place })));
-    this.labels = named.map((one) => ({ ...one, node: html("span", {}, one.place.name) }));
+    this.labels = named.map((one) => ({ ...one, node: html("span", {}, one.place.mirrored ? `${one.place.name}, mirror image` : one.place.name) }));
     byId("labels").replaceChildren(...this.labels.map(({ node }) => node));
+    this.written = null;
     this.measure();
   }
 

@@ -21,7 +21,10 @@ class Visit {
 
   /** Follows the next truck that has set out, or the one before. */
   async pickNext(by) {
-    const { batch, followed } = this.again?.from ?? this.focus ?? this.app.crowds[0];
+    const crowd = this.again?.from ?? this.focus ?? this.app.crowds[0];
+    // Before the first trucks are there.
+    if (crowd === undefined || crowd.closed) return;
+    const { batch, followed } = crowd;
     const n = Math.max(Math.min(batch.begun, batch.n), 1);
     await this.pick((((followed ?? -by) + by) % n + n) % n, this.again?.from ?? this.focus ?? undefined);
   }
@@ -58,7 +61,7 @@ class Visit {
       return;
     }
     if (this.focus === null) await this.pickNext(1);
-    this.takeOver();
+    if (this.focus !== null) this.takeOver();
   }
 
   /** Takes over the followed truck; `asked` is a steer angle (rad) and a target speed (m/s). */
@@ -91,6 +94,7 @@ class Visit {
   /** Lets a failure happen again: a batch of one truck with the same stream, episode and policy. */
   async driveAgain(crowd, failure) {
     const { app } = this;
+    if (crowd.closed) return;
     this.giveBack();
     this.endAgain();
     await Promise.all(app.crowds.map((one) => one.follow(null)));

@@ -2,7 +2,7 @@
 
 /** As published by Attard and Bajada (2023) for their soft actor-critic, and the benchmarks with their routes. */
 const STUDY = {
-  benchmarks: ["attard2023", "attard2023-as-run"],
+  benchmarks: ["attard2023", "attard2023-as-run"], routes: { test: 23, train: 52 },
   test: { arrived: 506, episodes: 690 }, train: { arrived: 1240, episodes: 1560 },
   laneDistance: 0.73, envSteps: 1.5e6,
 };
@@ -21,8 +21,9 @@ function fraction(summary) {
   return html("td", {}, percent(arrived / episodes), html("span", { class: "muted" }, ` ${whole(arrived)}/${whole(episodes)}, ${interval(low, high)}${overRoutes(summary)}`));
 }
 
-/** Whether the benchmark's routes are the study's. */
-const comparable = (evaluation) => STUDY.benchmarks.includes(evaluation.benchmark);
+/** Whether the routes are the study's, all of them; of further evaluations, which are of whole splits, by the benchmark. */
+const comparable = ({ benchmark, split, routes }) => STUDY.benchmarks.includes(benchmark)
+  && (routes === undefined || routes.length === (STUDY.routes[split] ?? routes.length));
 
 /** Fills the header and the first section. */
 function showHeadline(page) {

@@ -77,7 +77,9 @@ function merged(routes) {
   const [success_low, success_high] = wilson(arrived, episodes);
   return {
     episodes, arrived, success: arrived / episodes, success_low, success_high,
-    ends: Object.fromEntries(Object.keys(routes[0].ends).map((name) => [name, sum((route) => route.ends[name])])),
+    // Ends among vehicles stand where there was one.
+    ends: Object.fromEntries([...new Set(routes.flatMap((route) => Object.keys(route.ends)))].map(
+      (name) => [name, sum((route) => route.ends[name] ?? 0)])),
     lane_distance_mean: sum((route) => route.episodes * route.lane_distance_mean) / episodes,
     lane_distance_max: most((route) => route.lane_distance_max),
     load_transfer_ratio_peak: most((route) => route.load_transfer_ratio_peak),

@@ -4,6 +4,7 @@ use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 use offtrack::files::cache::Loading;
+use offtrack::layout::N_CARS;
 use offtrack::scenario::Scenario;
 use offtrack::simulator::{Autoreset, RouteChoice, Simulator};
 use offtrack::traffic::units::length;
@@ -68,8 +69,13 @@ fn vehicles_that_keep_a_gap_an_inch_off_drive_otherwise_in_a_browser() {
 
 /// Three routes among many vehicles, of which some are vans and some drivers rude.
 fn crowded() -> Ground {
-    let text = Scenario::text_of("attard2023").unwrap()
-        + "\n[traffic]\ndemand = [1500, 2100]\nvans = 0.3\nrude = 0.4\n[observation]\nvehicles = true\n";
+    among("rude = 0.4")
+}
+
+/// Three routes among many vehicles, of which some are vans, with these keys.
+fn among(keys: &str) -> Ground {
+    let traffic = format!("\n[traffic]\ndemand = [1500, 2100]\nvans = 0.3\n{keys}\n[observation]\nvehicles = true\n");
+    let text = Scenario::text_of("attard2023").unwrap() + &traffic;
     let mut scenario = Scenario::parse("among", &text, None, &Loading::PLAIN).unwrap();
     scenario.retain(|_, route| route.name.starts_with("20m/N"));
     let world = Arc::new(World::bake(&scenario).unwrap());
@@ -160,6 +166,35 @@ fn vehicles_have_the_colours_of_their_kind_lit_brakes_and_an_edge_where_drivers_
     for words in ["car", "van", "edge of who is rude"] {
         assert!(legend.lines().any(|line| line.trim() == words), "{legend}");
     }
+}
+
+#[test]
+fn buses_and_trucks_with_trailers_are_drawn_where_both_units_are() {
+    let place = Place::new();
+    let ground = among("buses = 0.2\ntractor_trailers = 0.4");
+    let mut simulator = simulator(&ground.world);
+    (0..20).for_each(|_| simulator.step_at_random());
+    let around = |env: usize| -> Vec<Vehicle> {
+        let all = Vehicle::around(&ground.world, simulator.batch(), env).into_iter();
+        all.filter(|vehicle| vehicle.is_large() && vehicle.position.iter().all(|at| at.abs() < 40.0)).collect()
+    };
+    let env = (0..N_SEEN).max_by_key(|&env| around(env).len()).unwrap();
+    let vehicles = around(env);
+    let points: Vec<Value> = vehicles
+        .iter()
+        .map(|vehicle| json!({ "road": 0, "point": parts(vehicle)[0], "inwards": [0.0, 0.0], "width": WIDTH }))
+        .collect();
+    let plan = json!({
+        "visit": "colouring", "n": N_SEEN, "steps": 20, "followed": env, "points": points, "names": ["van"],
+    });
+    let page = written(vec![ground], Vec::new(), &place.file("trucks.html"));
+    let found = visited(&page, &plan, HashMap::new(), false);
+    let trailers = vehicles.iter().filter(|vehicle| N_CARS <= vehicle.slot).count();
+    assert!(1 < trailers && trailers < vehicles.len(), "{vehicles:?}");
+    for (vehicle, seen) in vehicles.iter().zip(found["seen"].as_array().unwrap()) {
+        assert!(between(seen, &found["colours"]["van"]) < 8, "{vehicle:?}: {seen}");
+    }
+    assert!(found["legend"].as_str().unwrap().contains("van, bus, truck"), "{}", found["legend"]);
 }
 
 #[test]
