@@ -78,7 +78,7 @@ mod tests {
     use super::*;
 
     /// A table, and a change of it.
-    type Change = (&'static str, fn(&mut World));
+    type Change<T = World> = (&'static str, fn(&mut T));
 
     #[test]
     fn a_change_of_any_table_of_a_world_is_another_fingerprint() {
@@ -125,7 +125,7 @@ mod tests {
         let alone = World { traffic: None, ..world.clone() };
         assert_ne!(alone.fingerprint(), before);
         assert!(alone.bytes() + 100_000 < world.bytes(), "{} {}", alone.bytes(), world.bytes());
-        let changes: [(&'static str, fn(&mut Traffic)); 11] = [
+        let changes: [Change<Traffic>; 11] = [
             ("rules", |traffic| traffic.rules.courtesy += 1),
             ("rude", |traffic| traffic.rude[1] += 1),
             ("spacing", |traffic| traffic.spacing += 0.1),
