@@ -151,7 +151,10 @@ fn a_left_hand_road_has_its_lanes_by_the_names_that_a_driver_there_would_say() {
 #[test]
 fn a_benchmark_names_the_routes_of_a_left_hand_road_as_they_are_there() {
     let folder = tempfile::tempdir().unwrap();
-    let (scenario, world) = world(folder.path(), &left_hand(&text("16m")), "drivable");
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/roundabouts/left_hand_16m.toml");
+    let text = left_hand(&text("16m"));
+    assert_eq!(fs::read_to_string(file).unwrap(), text, "what the page of a browser is tested with");
+    let (scenario, world) = world(folder.path(), &text, "drivable");
     assert!(world.route_names.contains(&"road/E-left-1".to_owned()));
     assert_eq!(scenario.routes().count(), world.routes.len());
 }

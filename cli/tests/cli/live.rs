@@ -3,6 +3,7 @@
 #[path = "../../../tests/simulator/parity/compare.rs"]
 mod compare;
 mod devtools;
+mod hand;
 mod learned;
 mod page;
 mod policies;

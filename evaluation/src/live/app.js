@@ -369,9 +369,9 @@ class App {
 
   /** Shows a point of a road in the middle, the canvas so many metres wide. */
   lookAt(road, x, y, width) {
-    const { camera } = this.stage, { offset } = this.placeOf(road);
+    const { camera } = this.stage, { offset, side } = this.placeOf(road);
     camera.stay();
-    camera.centre = [offset[0] + x, offset[1] + y];
+    camera.centre = [offset[0] + x, offset[1] + side * y];
     camera.pixel = width / camera.size[0];
     this.draw();
   }

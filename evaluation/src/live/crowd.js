@@ -103,16 +103,21 @@ class Crowd {
     return { n: there.length, slow: slow.length, demand: demand[this.batch.demand ?? words[cars.level]] };
   }
 
+  /** -1 where the followed truck's road is mirrored back: what it does to the left is seen to the right. */
+  get side() {
+    return this.row === null ? 1 : this.picture.sites.sideOf(this.row.truck.route);
+  }
+
   /** Where the followed truck is in the picture (m), moved on by `since` seconds as view.wgsl does it. */
   middle(since) {
-    const { truck } = this.row, rig = this.rigOf(truck), offset = this.picture.sites.offsetOf(truck.route);
+    const { truck } = this.row, rig = this.rigOf(truck);
     const way = truck.held ? 0 : truck.speed * since, turn = (way * Math.tan(truck.steering)) / rig.wheelbase;
     const along = truck.heading + turn / 2, position = [way * Math.cos(along), way * Math.sin(along)]
       .map((moved, axis) => truck.position[axis] + moved);
     const trailer_heading = truck.trailer_heading +
       (way * Math.sin(truck.heading - truck.trailer_heading)) / rig.trailer_wheelbase;
     const trailer = this.trailerOf({ ...truck, position, heading: truck.heading + turn, trailer_heading });
-    return position.map((at, axis) => offset[axis] + 0.6 * at + 0.4 * trailer[axis]);
+    return this.picture.sites.placed(truck.route, position.map((at, axis) => 0.6 * at + 0.4 * trailer[axis]));
   }
 
   /** Reads the sums and the failures. */
@@ -133,19 +138,18 @@ class Crowd {
 
   /** Index of the truck nearest to a point of the picture, within `reach`; null where there is none. All (m). */
   async nearest(point, reach) {
-    const { offsetOf } = this.picture.sites, { fields, size } = this.picture.picture.live.facts.code.structs.Truck;
+    const { onRoad } = this.picture.sites, { fields, size } = this.picture.picture.live.facts.code.structs.Truck;
     const bytes = new DataView(await this.batch.column("truck"));
     let found = null, least = reach;
     for (let env = 0; env < this.batch.n; env++) {
       const float = (name, more = 0) => bytes.getFloat32(env * size + fields[name].at + more, true);
       const word = (name) => bytes.getUint32(env * size + fields[name].at, true);
       if (word("held") === 1) continue;
-      const offset = offsetOf(word("route"));
+      const [toX, toY] = onRoad(word("route"), point);
       // Also a click on the trailer finds the truck.
-      const [x, y] = [offset[0] + float("position"), offset[1] + float("position", 4)];
-      const heading = float("trailer_heading");
+      const [x, y] = [float("position"), float("position", 4)], heading = float("trailer_heading");
       for (const back of [0, 4, 8]) {
-        const away = Math.hypot(x - back * Math.cos(heading) - point[0], y - back * Math.sin(heading) - point[1]);
+        const away = Math.hypot(x - back * Math.cos(heading) - toX, y - back * Math.sin(heading) - toY);
         if (away < least) [found, least] = [env, away];
       }
     }

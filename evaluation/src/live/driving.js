@@ -72,7 +72,7 @@ class Driving {
     if (!this.isOn) return;
     const { truck } = this.crowd.row, lock = this.crowd.rigOf(truck).steer_max;
     if (truck.episode !== this.episode) this.begin();
-    const turn = Number(this.held.has("left")) - Number(this.held.has("right"));
+    const turn = this.crowd.side * (Number(this.held.has("left")) - Number(this.held.has("right")));
     if (this.point) {
       this.steering = this.towards(this.point);
     } else if (turn !== 0) {
@@ -88,10 +88,10 @@ class Driving {
   /** The steer angle whose circle leads the front axle towards a point (rad). */
   towards(point) {
     const { truck } = this.crowd.row, { wheelbase } = this.crowd.rigOf(truck);
-    const offset = this.crowd.picture.sites.offsetOf(truck.route);
+    const [x, y] = this.crowd.picture.sites.onRoad(truck.route, point);
     const front = [Math.cos(truck.heading), Math.sin(truck.heading)].map((part, axis) =>
-      offset[axis] + truck.position[axis] + wheelbase * part);
-    return wrapped(Math.atan2(point[1] - front[1], point[0] - front[0]) - truck.heading);
+      truck.position[axis] + wheelbase * part);
+    return wrapped(Math.atan2(y - front[1], x - front[0]) - truck.heading);
   }
 
   ask() {
@@ -99,8 +99,8 @@ class Driving {
     const speed = world.facts.changes_speed ? this.speed - row.control.target_speed : this.speed;
     batch.takeOver(followed, { steering: this.steering, speed });
     this.crowd.driven.add(`${followed}/${row.truck.episode}`);
-    const side = (50 * this.steering) / this.crowd.rigOf(row.truck).steer_max;
-    byId("hud-steering").firstElementChild.style.left = `${50 - side}%`;
+    const left = (50 * this.crowd.side * this.steering) / this.crowd.rigOf(row.truck).steer_max;
+    byId("hud-steering").firstElementChild.style.left = `${50 - left}%`;
     byId("hud-speed").textContent = `${decimal(3.6 * this.speed, 0)}${GAP}km/h`;
   }
 }

@@ -5,13 +5,13 @@ const transferOf = ({ truck }) =>
   Math.max(Math.abs(truck.tractor_load_transfer_ratio), Math.abs(truck.trailer_load_transfer_ratio));
 const articulationOf = ({ truck }) => wrapped(truck.heading - truck.trailer_heading);
 
-/** The readings: name, value of a step, text. Each is also a small curve over the episode. */
+/** The readings: name, value of a step as it is seen, text. Each is also a small curve over the episode. */
 const LIVE_READINGS = [
   ["Speed", ({ row }) => 3.6 * row.truck.speed, (value) => `${decimal(value, 1)}${GAP}km/h`, "tall"],
   ["Load transfer ratio", ({ row }) => transferOf(row), (value) => decimal(value, 2), "tall"],
   ["Off-tracking", ({ offTracking }) => offTracking, metres],
-  ["Steering", ({ row }) => toDegrees(row.truck.steering), turnWords],
-  ["Articulation", ({ row }) => toDegrees(articulationOf(row)), (value) => degrees(value, 1)],
+  ["Steering", ({ row }, side) => side * toDegrees(row.truck.steering), turnWords],
+  ["Articulation", ({ row }, side) => side * toDegrees(articulationOf(row)), (value) => degrees(value, 1)],
   ["Nearest kerb", ({ row }) => Math.min(row.clearance.tractor, row.clearance.trailer), metres],
   ["Lane's centre", ({ row }) => row.progress.lane_distance, metres],
 ];
@@ -32,7 +32,7 @@ class Followed {
     this.crowd = crowd;
     byId("truck").hidden = crowd === null;
     if (crowd === null) return;
-    const { world, policy } = crowd, facts = this.live.facts.code, { extras, actions, traffic } = world.facts;
+    const { world, policy } = crowd, facts = this.live.facts.code, { extras, traffic } = world.facts;
     const extra = extras.map((name, n) => {
       const { doc } = facts.extras.find((extra) => extra.name === name);
       return { name, doc, n: 1, low: -1, first: facts.n_values + n };
@@ -45,9 +45,17 @@ class Followed {
     this.values = new ValueBars(observed);
     byId("values").replaceChildren(this.values.node);
     byId("policy-part").hidden = policy === null;
-    this.outputs = policy && new OutputCells(actions);
-    if (policy) byId("outputs").replaceChildren(this.outputs.node);
+    this.outputs = null;
+    if (policy) this.showOutputs();
     this.show(true);
+  }
+
+  /** Makes the cells of a policy's outputs, from left to right as they are seen. */
+  showOutputs() {
+    const { world, side } = this.crowd;
+    this.side = side;
+    this.outputs = new OutputCells(world.facts.actions.map(([steering, ...more]) => [side * steering, ...more]));
+    byId("outputs").replaceChildren(this.outputs.node);
   }
 
   /** Shows the latest step, some times a second. */
@@ -55,10 +63,10 @@ class Followed {
     const { crowd } = this, now = performance.now();
     if (crowd === null || crowd.row === null || (!atOnce && now - this.shownAt < 1000 / PANEL_RATE)) return;
     this.shownAt = now;
-    const { row, steps, world } = crowd, { truck } = row;
+    const { row, steps, world, side } = crowd;
     this.name(row);
     LIVE_READINGS.forEach(([, value, words], index) => {
-      const node = byId("readings").children[index], values = thinned(steps.map(value), MOST_SPARKS);
+      const node = byId("readings").children[index], values = thinned(steps.map((step) => value(step, side)), MOST_SPARKS);
       if (values.length === 0) return;
       node.querySelector("dd").textContent = words(values.at(-1));
       node.querySelector("svg").replaceWith(sparkline(values));
@@ -67,6 +75,7 @@ class Followed {
     const seen = [...row.observation, ...[...row.extras].slice(0, world.facts.extras.length), ...around];
     this.values.show(seen);
     if (this.outputs) {
+      if (side !== this.side) this.showOutputs();
       const best = this.outputs.show(crowd.policy.outputs(row.observation, row.extras, row.around));
       // Behind the table's actions stands that of a visitor who drives.
       byId("outputs-words").textContent = `${row.action < world.facts.n_actions ? "chooses" : "would choose"} ${best}`;

@@ -21,7 +21,7 @@ class Stage {
     byId("pane-labels").replaceChildren(...(crowds.length < 2 ? [] : [html("i"), ...crowds.map(({ policy }, n) =>
       html("span", { style: `left: calc(${(100 * n) / crowds.length}% + 12px)` }, policyWords(policy)))]));
     const named = crowds.flatMap((crowd, pane) => crowd.picture.sites.places.map((place) => ({ pane, place })));
-    this.labels = named.map((one) => ({ ...one, node: html("span", {}, one.place.mirrored ? `${one.place.name}, mirror image` : one.place.name) }));
+    this.labels = named.map((one) => ({ ...one, node: html("span", {}, one.place.name) }));
     byId("labels").replaceChildren(...this.labels.map(({ node }) => node));
     this.written = null;
     this.measure();
@@ -96,7 +96,7 @@ class Stage {
     if (key === this.written) return;
     this.written = key;
     for (const { pane, place, node } of this.labels) {
-      const [x, y] = this.pixelOf(place, place.bounds[0], place.bounds[3]);
+      const [x, y] = this.pixelOf(place, place.bounds[0], place.bounds[0 < place.side ? 3 : 1]);
       const wide = (place.bounds[2] - place.bounds[0]) / camera.pixel;
       node.hidden = camera.goesAlong || wide < 70 || this.labels.length === this.panes.length;
       node.style.transform = `translate(${pane * width + x + 8}px, ${y + 8}px)`;
@@ -107,9 +107,9 @@ class Stage {
   }
 
   /** The pixel of a pane at a point of a place's own coordinates (m). */
-  pixelOf({ offset }, x, y) {
+  pixelOf({ offset, side }, x, y) {
     const { camera } = this, [width, height] = camera.size, [cx, cy] = this.panes[0].centre ?? camera.centre;
-    return [width / 2 + (offset[0] + x - cx) / camera.pixel, height / 2 - (offset[1] + y - cy) / camera.pixel];
+    return [width / 2 + (offset[0] + x - cx) / camera.pixel, height / 2 - (offset[1] + side * y - cy) / camera.pixel];
   }
 
   /** The point of the plane under a pixel of a pane (m). */

@@ -60,7 +60,7 @@ fn vehicle(vertex: u32, env: u32, slot: u32, alpha: f32, is_trailer: bool) -> Ve
     if is_trailer { outline = trailer_of(network, car); }
     let half = vec2<f32>(outline.half_length, outline.half_width);
     let local = SQUARE[vertex] * (half + view.pixel);
-    let p = sites[truck[env].route].offset + outline.middle + rotated(outline.along, local);
+    let p = offset_of(sites[truck[env].route]) + outline.middle + rotated(outline.along, local);
     let is_rude = (style_of(car) & RUDE) == RUDE;
     let brakes = f32(car.acceleration) / STATE_ACCELERATION < BRAKES;
     return Vehicle(

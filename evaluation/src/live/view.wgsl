@@ -69,10 +69,11 @@ struct Theme {
     ends: array<vec4<f32>, 10>,
 }
 
-// Where a route's roundabout lies in the picture, or a place and one of its routes.
+// Where a route's roundabout lies in the picture, or a place and one of its routes. `side` is -1 where the road is driven
+// as its mirror image, which the picture mirrors back, and 1 elsewhere.
 struct Site {
     offset: vec2<f32>,
-    place: u32,
+    side: f32,
     route: u32,
 }
 
@@ -81,6 +82,15 @@ struct Site {
 @group(1) @binding(2) var<storage, read> sites: array<Site>;
 // Middles of the followed truck's drive axle and of its trailer's axles, a step each, from the roundabout's origin (m).
 @group(1) @binding(3) var<storage, read> points: array<vec4<f32>>;
+
+// The side of what is being drawn.
+var<private> side: f32 = 1.0;
+
+// What is added to points of a site's roundabout; `on_screen` mirrors the sum back.
+fn offset_of(site: Site) -> vec2<f32> {
+    side = site.side;
+    return vec2<f32>(site.offset.x, side * site.offset.y);
+}
 
 struct Painted {
     @builtin(position) position: vec4<f32>,
@@ -100,7 +110,7 @@ struct Seen {
 // A truck moved on by the time since its last step, as its wheels roll.
 fn seen(env: u32) -> Seen {
     var now = truck[env];
-    let offset = sites[now.route].offset;
+    let offset = offset_of(sites[now.route]);
     if now.held == 0u {
         let way = now.speed * view.since;
         let turn = way * tan(now.steering) / vehicles[now.vehicle].rig.wheelbase;
@@ -114,7 +124,7 @@ fn seen(env: u32) -> Seen {
 }
 
 fn on_screen(p: vec2<f32>) -> vec4<f32> {
-    return vec4<f32>((p - view.centre) / view.half, 0.0, 1.0);
+    return vec4<f32>((vec2<f32>(p.x, side * p.y) - view.centre) / view.half, 0.0, 1.0);
 }
 
 fn painted(p: vec2<f32>, colour: vec4<f32>) -> Painted {
@@ -140,7 +150,7 @@ fn ground(@builtin(vertex_index) vertex: u32, @builtin(instance_index) place: u3
     let field = field_at(site.route);
     let extent = vec2<f32>(f32(field.columns), f32(field.rows)) / field.cells_per_metre;
     let at = field.origin + (0.5 + 0.5 * SQUARE[vertex]) * extent;
-    return Ground(on_screen(site.offset + at), at, site.route);
+    return Ground(on_screen(offset_of(site) + at), at, site.route);
 }
 
 // The colour of the ground by its distance to the kerbs.
@@ -215,7 +225,7 @@ fn body(vertex: u32, env: u32, colour: vec3<f32>, alpha: f32) -> Painted {
 fn hue(env: u32) -> vec3<f32> {
     let now = truck[env];
     if view.colouring == BY_STEERING {
-        let asked = actions[action[env]].steering / vehicles[now.vehicle].rig.steer_max;
+        let asked = sites[now.route].side * actions[action[env]].steering / vehicles[now.vehicle].rig.steer_max;
         let turn = smoothstep(0.0, 0.8, abs(asked));
         return mix(theme.straight.rgb, select(theme.right.rgb, theme.left.rgb, 0.0 < asked), turn);
     } else if view.colouring == BY_LOAD_TRANSFER {
@@ -254,15 +264,15 @@ fn body_colour(in: Painted) -> @location(0) vec4<f32> {
 fn wheels(@builtin(vertex_index) vertex: u32, @builtin(instance_index) wheel: u32) -> Painted {
     let now = seen(view.followed);
     let rig = vehicles[now.truck.vehicle].rig;
-    let side = select(-1.0, 1.0, wheel % 2u == 0u);
+    let flank = select(-1.0, 1.0, wheel % 2u == 0u);
     let axle = wheel / 2u;
     var origin = now.trailer;
     var heading = now.truck.trailer_heading;
-    var at = vec2<f32>(1.31 * (f32(axle) - 3.0), side * (rig.trailer_body.half_width - 0.25));
+    var at = vec2<f32>(1.31 * (f32(axle) - 3.0), flank * (rig.trailer_body.half_width - 0.25));
     if axle < 2u {
         origin = now.position;
         heading = now.truck.heading;
-        at = vec2<f32>(select(rig.wheelbase, 0.0, axle == 1u), side * (rig.tractor_body.half_width - 0.22));
+        at = vec2<f32>(select(rig.wheelbase, 0.0, axle == 1u), flank * (rig.tractor_body.half_width - 0.22));
     }
     let hub = origin + rotated(direction(heading), at);
     let turned = heading + select(0.0, now.truck.steering, axle == 0u);
@@ -283,7 +293,7 @@ fn route_line(@builtin(vertex_index) vertex: u32, @builtin(instance_index) index
     let now = truck[view.followed];
     let route = route_at(now.route);
     if route.n_waypoints <= index + 1u { return unseen(); }
-    let offset = sites[now.route].offset;
+    let offset = offset_of(sites[now.route]);
     let behind = offset + waypoint_at(route.first + index).position;
     let ahead = offset + waypoint_at(route.first + index + 1u).position;
     let alpha = select(0.85, 0.25, index + 1u < progress[view.followed].waypoint);
@@ -316,7 +326,7 @@ fn mark_at(vertex: u32, p: vec2<f32>, radius: f32, kind: f32, colour: vec3<f32>)
 fn paths(@builtin(vertex_index) vertex: u32, @builtin(instance_index) index: u32) -> Painted {
     let step = index / 2u;
     if view.n_points <= step + 1u { return unseen(); }
-    let offset = sites[truck[view.followed].route].offset;
+    let offset = offset_of(sites[truck[view.followed].route]);
     let behind = points[step];
     let ahead = points[step + 1u];
     if index % 2u == 0u { return on_line(vertex, offset + behind.xy, offset + ahead.xy, 2.5, theme.tractor.rgb, 0.9); }
@@ -328,7 +338,7 @@ fn paths(@builtin(vertex_index) vertex: u32, @builtin(instance_index) index: u32
 fn crosses(@builtin(vertex_index) vertex: u32, @builtin(instance_index) index: u32) -> Painted {
     if journal.count <= index { return unseen(); }
     let failure = journal.failures[index];
-    let p = sites[failure.route].offset + failure.position;
+    let p = offset_of(sites[failure.route]) + failure.position;
     return mark_at(vertex, p, CROSS_RADIUS, -2.0, theme.ends[failure.ended].rgb);
 }
 

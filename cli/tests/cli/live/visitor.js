@@ -95,6 +95,43 @@ async function among(live, { n, steps, demand }) {
   page.gpu.destroy();
 }
 
+/** Where points of a road are seen, whether a truck is found where it is seen, and how it is steered by the left key and
+ * towards points to its left and to its right as they are seen. */
+async function hand(live, { points }) {
+  const page = await opened(live, { n: 8, policy: -1 }), [crowd] = page.crowds;
+  await page.between(() => crowd.batch.restart({ seed: 0, atOnce: 8 }));
+  const colours = [], look = async (point) => {
+    page.lookAt(0, ...point, 60);
+    colours.push((await page.pixelAt(...page.screenOf(0, ...point))).slice(0, 3));
+  };
+  await look(page.world.waypoints(0)[8].position);
+  await page.stepBy(4);
+  await page.pickTruck(1);
+  byId("rays").checked = false;
+  page.setRate(1);
+  const { truck } = crowd.row, { sites } = crowd.picture;
+  const position = sites.placed(truck.route, truck.position), found = await crowd.nearest(position, 2);
+  const side = sites.placed(truck.route, [0, 1])[1] - sites.placed(truck.route, [0, 0])[1];
+  // The rear of its cab.
+  const ahead = crowd.rigOf(truck).tractor_body.front - 1.4;
+  await look([Math.cos(truck.heading), Math.sin(truck.heading)].map((part, axis) => truck.position[axis] + ahead * part));
+  const pixels = points.map((point) => page.screenOf(0, ...point));
+  page.takeOver({ steering: 0, speed: 2 });
+  page.play(false);
+  const { driving } = page.visit, heading = side * truck.heading;
+  driving.key("ArrowLeft", true);
+  driving.update(0.1);
+  driving.key("ArrowLeft", false);
+  const byKey = driving.steering, mark = parseFloat(byId("hud-steering").firstElementChild.style.left);
+  const towards = [1, -1].map((left) => driving.towards([
+    position[0] + 30 * Math.cos(heading) - 10 * left * Math.sin(heading),
+    position[1] + 30 * Math.sin(heading) + 10 * left * Math.cos(heading),
+  ]));
+  const theme = Object.fromEntries(["road", "tractor"].map((name) => [name, page.colour(name)]));
+  await give("hand", JSON.stringify({ side, found, colours, theme, pixels, byKey, mark, towards }));
+  page.gpu.destroy();
+}
+
 /** A truck that is taken over: steer angles of its steps, asked for beyond the lock; and after it is given back. */
 async function wheel(live) {
   const page = await opened(live, { n: 8 }), [crowd] = page.crowds;
@@ -336,7 +373,7 @@ async function without(live, { hasApi }) {
 }
 
 const VISITS = {
-  pixels, colouring, among, wheel, keys, touch, files, bytes, roads, unbaked, counts, again, lost, without,
+  pixels, colouring, among, hand, wheel, keys, touch, files, bytes, roads, unbaked, counts, again, lost, without,
 };
 
 try {
