@@ -85,10 +85,14 @@ struct Driver {
     interaction: i32,
     // Whether it stops before its line.
     stops: bool,
-    // The nearest car that it follows: station of its rear, and its speed (2^-10 m, 2^-14 m a step).
-    leader_rear: i32,
+    // What it follows nearest: the station of its rear, and below LEADERS its rank, 0 of a car and that of a truck in its
+    // group from 1 on (2^-10 m / LEADERS); and its speed (2^-14 m a step).
+    leader: i32,
     leader_speed: i32,
 }
+
+// Ranks of what is followed: of equally near ones the lowest, in every row of a group and on either engine.
+const LEADERS: i32 = 16;
 
 // A number of the driver model: see `Rules`.
 fn rule(index: u32) -> i32 {
@@ -104,7 +108,7 @@ fn decided(env: u32, slot: u32, car: Car) -> u32 {
     let me = seen_car(network, slot, car);
     let headway = rule(RULE_HEADWAY) * (TIME_PARTS - temperament) / TIME_PARTS;
     let is_large = large_of(style_of(car)) != 0u;
-    var driver = Driver(env, network, me, path, car, temperament, headway, 0, false, BEYOND, 0);
+    var driver = Driver(env, network, me, path, car, temperament, headway, 0, false, LEADERS * BEYOND, 0);
     let ahead = pair_cell(me.station + SIGHT);
     let behind = pair_cell(me.station - me.length - BEHIND);
     for (var k = 0u; k < N_CARS; k++) {
@@ -125,20 +129,18 @@ fn decided(env: u32, slot: u32, car: Car) -> u32 {
             consider(&driver, zone_at(pair.y + ZONE_WORDS * (first + z)), weighed);
         }
     }
-    // The same car, if the row's own truck were not there. All rows of a group mind its trucks in one order: of two
-    // that are equally far along, the first is followed.
-    var without = driver;
+    // The row's own truck is the last: what is minded before is minded without it too.
+    var without = 0;
     let first = first_of_group(env);
-    for (var mate = first; mate < first + batch.group; mate++) {
+    for (var n = 1u; n <= batch.group; n++) {
+        let mate = first + (env - first + n) % batch.group;
+        if mate == env { without = driver.interaction; }
         if !is_driving(mate) { continue; }
         let view = view_of(mate, network);
         mind_at_line(&driver, view);
-        mind_in_corridor(&driver, view, car);
-        if mate == env { continue; }
-        mind_at_line(&without, view);
-        mind_in_corridor(&without, view, car);
+        mind_in_corridor(&driver, view, car, i32(mate - first) + 1);
     }
-    let slows_for_truck = without.interaction < driver.interaction;
+    let slows_for_truck = without < driver.interaction;
     keep_crossed_lanes_clear(&driver);
     if me.waits && driver.stops { stop_before(&driver, me.line - me.station); }
     // Half a step ahead: a speed's unit is the way of half a step.
@@ -199,7 +201,7 @@ fn follow_inside(driver: ptr<function, Driver>, zone: Zone, other: SeenCar) {
     if is_ahead(zone, me.station, other.station, other.slot < me.slot) {
         let rear = beside(zone, other.station - other.length);
         heed(driver, interaction_behind(*driver, rear - me.station, other.speed));
-        note_leader(driver, rear, other.speed);
+        note_leader(driver, rear, 0, other.speed);
     }
 }
 
@@ -272,9 +274,10 @@ fn stop_or_follow(driver: ptr<function, Driver>, distance: i32, gap: i32, speed:
     heed(driver, min(interaction_behind(*driver, gap, speed), stopping(distance, (*driver).me.square)));
 }
 
-fn note_leader(driver: ptr<function, Driver>, rear: i32, speed: i32) {
-    if rear < (*driver).leader_rear {
-        (*driver).leader_rear = rear;
+fn note_leader(driver: ptr<function, Driver>, rear: i32, rank: i32, speed: i32) {
+    let leader = LEADERS * rear + rank;
+    if leader < (*driver).leader {
+        (*driver).leader = leader;
         (*driver).leader_speed = speed;
     }
 }
@@ -316,7 +319,7 @@ fn consider_at_line(driver: ptr<function, Driver>, zone: Zone, other: SeenCar) {
         // It foresees how far one that passes moves away in a second.
         let soon = rear - me.station + ((10 * max(other.speed - me.speed, 0)) >> 4u);
         stop_or_follow(driver, me.line - me.station, soon, other.speed);
-        note_leader(driver, rear, other.speed);
+        note_leader(driver, rear, 0, other.speed);
     }
 }
 
@@ -343,7 +346,7 @@ fn lets_in(env: u32, inside: SeenCar, distance: i32, waiting: SeenCar) -> bool {
 // Stops before the line where there is no room behind the lanes that this car crosses.
 fn keep_crossed_lanes_clear(driver: ptr<function, Driver>) {
     let me = (*driver).me;
-    let rear = (*driver).leader_rear;
+    let rear = (*driver).leader >> 4u;
     let clear = line_of_car((*driver).network, (*driver).car).y;
     let would_block = rear - rule(RULE_GAP) - me.length < clear && me.line < rear;
     if me.waits && would_block && (*driver).leader_speed < SLOW { (*driver).stops = true; }

@@ -139,8 +139,8 @@ fn is_in_the_way(driver: Driver, view: View, zone: Zone) -> bool {
 }
 
 // Takes the ground that a truck covers into account: a car follows what is in its corridor, slows for what will be, and
-// brakes for what it would touch.
-fn mind_in_corridor(driver: ptr<function, Driver>, view: View, car: Car) {
+// brakes for what it would touch. `rank` is the truck's in its group, from 1 on.
+fn mind_in_corridor(driver: ptr<function, Driver>, view: View, car: Car, rank: i32) {
     let me = (*driver).me;
     let network = (*driver).network;
     let first = sample_behind(network, car);
@@ -163,7 +163,7 @@ fn mind_in_corridor(driver: ptr<function, Driver>, view: View, car: Car) {
         } else {
             heed(driver, interaction_behind(*driver, gap, speed));
         }
-        note_leader(driver, rear, speed);
+        note_leader(driver, rear, rank, speed);
     }
     if !view.waits && !me.is_rude {
         for (var k = 0u; k < leader; k++) {
