@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 import offtrack_sim
 from offtrack_sim import Batch
@@ -51,11 +52,13 @@ def prepare(args: argparse.Namespace) -> None:
         trained, judged = Batch(args.scenario, 1), Batch(args.benchmark, 1, split=args.split)
     except (OSError, ValueError) as error:
         raise SystemExit(str(error)) from None
-    tables = [
-        batch.action_table if batch.n_commands == 0 else np.zeros(batch.n_commands) for batch in (trained, judged)
-    ]
-    if trained.n_values != judged.n_values or not np.array_equal(*tables):
+    if trained.n_values != judged.n_values or not np.array_equal(_actions(trained), _actions(judged)):
         raise SystemExit(f"--benchmark: {args.benchmark}; has other observations or actions than {args.scenario}")
+
+
+def _actions(batch: Batch) -> npt.NDArray[Any]:
+    """Its table of actions, or zeros for a command's numbers."""
+    return np.zeros(batch.n_commands) if batch.n_commands else batch.action_table
 
 
 def written(args: argparse.Namespace, ending: str) -> Path:
