@@ -79,10 +79,9 @@ class Evaluation:
         Raises:
             TypeError, ValueError: For what are no finite numbers, or another number of them.
         """
-        found = values if isinstance(values, np.ndarray) and values.dtype == np.bool_ else None
-        if found is None:
-            found = numbers("values", values, "a number for each episode is needed")
-        found = found.astype(np.float64)
+        if isinstance(values, np.ndarray) and values.dtype == np.bool_:
+            values = values.astype(np.float64)
+        found = numbers("values", values, "a number for each episode is needed").astype(np.float64)
         if found.shape not in (self.ended.shape, (self.ended.size,)) or not np.isfinite(found).all():
             needed = f"finite numbers of shape ({self.ended.size},) or {self.ended.shape} are needed"
             raise ValueError(f"values: {found.dtype} of shape {found.shape}; {needed}")

@@ -85,14 +85,14 @@ struct Driver {
     interaction: i32,
     // Whether it stops before its line.
     stops: bool,
-    // What it follows nearest: the station of its rear, and below LEADERS its rank, 0 of a car and that of a truck in its
-    // group from 1 on (2^-10 m / LEADERS); and its speed (2^-14 m a step).
+    // What it follows nearest: the station of its rear (2^-10 m) with its rank in the lower RANK_BITS, 0 of a car and
+    // that of a truck in its group from 1 on; and its speed (2^-14 m a step).
     leader: i32,
     leader_speed: i32,
 }
 
-// Ranks of what is followed: of equally near ones the lowest, in every row of a group and on either engine.
-const LEADERS: i32 = 16;
+// Bits of the rank of what is followed: of equally near ones the lowest, in every row of a group, on either engine.
+const RANK_BITS: u32 = 4u;
 
 // A number of the driver model: see `Rules`.
 fn rule(index: u32) -> i32 {
@@ -108,7 +108,7 @@ fn decided(env: u32, slot: u32, car: Car) -> u32 {
     let me = seen_car(network, slot, car);
     let headway = rule(RULE_HEADWAY) * (TIME_PARTS - temperament) / TIME_PARTS;
     let is_large = large_of(style_of(car)) != 0u;
-    var driver = Driver(env, network, me, path, car, temperament, headway, 0, false, LEADERS * BEYOND, 0);
+    var driver = Driver(env, network, me, path, car, temperament, headway, 0, false, BEYOND << RANK_BITS, 0);
     let ahead = pair_cell(me.station + SIGHT);
     let behind = pair_cell(me.station - me.length - BEHIND);
     for (var k = 0u; k < N_CARS; k++) {
@@ -275,7 +275,7 @@ fn stop_or_follow(driver: ptr<function, Driver>, distance: i32, gap: i32, speed:
 }
 
 fn note_leader(driver: ptr<function, Driver>, rear: i32, rank: i32, speed: i32) {
-    let leader = LEADERS * rear + rank;
+    let leader = (rear << RANK_BITS) + rank;
     if leader < (*driver).leader {
         (*driver).leader = leader;
         (*driver).leader_speed = speed;
@@ -346,7 +346,7 @@ fn lets_in(env: u32, inside: SeenCar, distance: i32, waiting: SeenCar) -> bool {
 // Stops before the line where there is no room behind the lanes that this car crosses.
 fn keep_crossed_lanes_clear(driver: ptr<function, Driver>) {
     let me = (*driver).me;
-    let rear = (*driver).leader >> 4u;
+    let rear = (*driver).leader >> RANK_BITS;
     let clear = line_of_car((*driver).network, (*driver).car).y;
     let would_block = rear - rule(RULE_GAP) - me.length < clear && me.line < rear;
     if me.waits && would_block && (*driver).leader_speed < SLOW { (*driver).stops = true; }

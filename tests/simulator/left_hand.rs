@@ -14,34 +14,16 @@ use offtrack::world::World;
 use crate::episodes::{all_routes, rows};
 use crate::{batch_on, engines};
 
+mod text;
+
+pub(crate) use text::left_hand;
+
 const MIRROR: DVec2 = DVec2::new(1.0, -1.0);
 
 /// A shipped roundabout file's text.
 pub(crate) fn text(name: &str) -> String {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/roundabouts").join(name).with_extension("toml");
     fs::read_to_string(file).unwrap()
-}
-
-/// A roundabout file's text with left-hand traffic, as one would write it: other signs of bearings and offsets, and the
-/// lanes' names exchanged.
-pub(crate) fn left_hand(text: &str) -> String {
-    let negated = |line: &str, key: &str| match line.split_once(&format!("{key} = ")) {
-        Some((before, after)) => match after.strip_prefix('-') {
-            Some(after) => format!("{before}{key} = {after}"),
-            None => format!("{before}{key} = -{after}"),
-        },
-        None => line.to_owned(),
-    };
-    let line = |line: &str| {
-        let line = negated(&negated(line, "bearing_deg"), "offset");
-        match line.strip_suffix(".right]") {
-            Some(table) => format!("{table}.left]\n"),
-            None => {
-                line.strip_suffix(".left]").map_or_else(|| format!("{line}\n"), |table| format!("{table}.right]\n"))
-            }
-        }
-    };
-    format!("hand = \"left\"\n{}", text.lines().map(line).collect::<String>())
 }
 
 fn pair(name: &str) -> [Road; 2] {
@@ -151,10 +133,7 @@ fn a_left_hand_road_has_its_lanes_by_the_names_that_a_driver_there_would_say() {
 #[test]
 fn a_benchmark_names_the_routes_of_a_left_hand_road_as_they_are_there() {
     let folder = tempfile::tempdir().unwrap();
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/roundabouts/left_hand_16m.toml");
-    let text = left_hand(&text("16m"));
-    assert_eq!(fs::read_to_string(file).unwrap(), text, "what the page of a browser is tested with");
-    let (scenario, world) = world(folder.path(), &text, "drivable");
+    let (scenario, world) = world(folder.path(), &left_hand(&text("16m")), "drivable");
     assert!(world.route_names.contains(&"road/E-left-1".to_owned()));
     assert_eq!(scenario.routes().count(), world.routes.len());
 }

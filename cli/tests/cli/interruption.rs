@@ -4,7 +4,8 @@
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
-use crate::place::{Place, program, succeed};
+use crate::place::{Place, succeed};
+use crate::resume::{resume, wait_until};
 
 /// A run far too long to end by itself, once it writes figures.
 fn begun(place: &Place) -> Child {
@@ -14,15 +15,8 @@ fn begun(place: &Place) -> Child {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    wait_for(place, "runs/run/metrics.csv");
+    wait_until("figures", || place.file("runs/run/metrics.csv").is_file());
     run
-}
-
-/// Waits until a file is there.
-fn wait_for(place: &Place, file: &str) {
-    while !place.file(file).is_file() {
-        std::thread::sleep(Duration::from_millis(10));
-    }
 }
 
 fn ended(run: Child, signal: &str) -> Output {
@@ -68,14 +62,11 @@ fn a_run_killed_in_its_first_seconds_leaves_a_policy_and_a_checkpoint_to_continu
     let run = begun(&place);
     let checkpoint = place.file("runs/run/checkpoint.safetensors");
     let policy = place.file("runs/run/policy.safetensors");
-    while !(checkpoint.is_file() && policy.is_file()) {
-        std::thread::sleep(Duration::from_millis(10));
-    }
+    wait_until("policy and checkpoint", || checkpoint.is_file() && policy.is_file());
     assert_eq!(ended(run, "-KILL").status.code(), None);
     assert_whole_rows(&place);
     succeed(&place.evaluate(&["--policy", policy.to_str().unwrap(), "--episodes", "1"]));
-    let resumed = program().args(["train", "--resume", &place.text("runs/run"), "--steps", "2000"]).output().unwrap();
-    succeed(&resumed);
+    succeed(&resume(&place, "run", &["--steps", "2000"]));
     assert_eq!(place.json("runs/run/report.json")["env_steps"], 2000);
 }
 
@@ -83,7 +74,7 @@ fn a_run_killed_in_its_first_seconds_leaves_a_policy_and_a_checkpoint_to_continu
 fn a_run_that_begins_again_for_want_of_a_checkpoint_has_no_rows_of_before() {
     let place = Place::new();
     let run = begun(&place);
-    wait_for(&place, "runs/run/checkpoint.safetensors");
+    wait_until("a checkpoint", || place.file("runs/run/checkpoint.safetensors").is_file());
     ended(run, "-KILL");
     std::fs::remove_file(place.file("runs/run/checkpoint.safetensors")).unwrap();
     // As if it had been killed while it wrote its first checkpoint, after a row.
@@ -91,8 +82,7 @@ fn a_run_that_begins_again_for_want_of_a_checkpoint_has_no_rows_of_before() {
     let metrics = std::fs::read_to_string(&file).unwrap();
     let row = format!("5.0,999999{}", ",".repeat(metrics.lines().next().unwrap().matches(',').count() - 1));
     std::fs::write(&file, format!("{metrics}{row}\n")).unwrap();
-    let again = ["train", "--resume", &place.text("runs/run"), "--steps", "800"];
-    succeed(&program().args(again).output().unwrap());
+    succeed(&resume(&place, "run", &["--steps", "800"]));
     let metrics = std::fs::read_to_string(file).unwrap();
     let steps: Vec<&str> = metrics.lines().skip(1).map(|row| row.split(',').nth(1).unwrap()).collect();
     assert_eq!(steps.last(), Some(&"800"), "{metrics}");

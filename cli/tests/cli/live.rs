@@ -5,6 +5,8 @@ mod compare;
 mod devtools;
 mod hand;
 mod learned;
+#[path = "../../../tests/simulator/left_hand/text.rs"]
+mod left_hand;
 mod page;
 mod policies;
 mod roads;

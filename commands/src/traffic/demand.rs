@@ -12,10 +12,8 @@ impl Place {
     /// The demand that the flag asks for, and its flow by path (veh/h).
     pub(super) fn demand(&self, text: &str, mix: Mix) -> Result<(Demand, Vec<f64>), Error> {
         let flows = match text.parse() {
-            Ok(total) => {
-                check(total).map_err(|wrong| setting("--demand", text, &format!("{}: {wrong}", self.road.name)))?;
-                Demand::even(&self.network, total)
-            }
+            Ok(total) if !(0.0..=MOST).contains(&total) => return Err(self.beyond(text, text)),
+            Ok(total) => Demand::even(&self.network, total),
             Err(_) => self.by_arm(text)?,
         };
         let demand = Demand::new(&self.network, &flows, mix)
@@ -34,8 +32,9 @@ impl Place {
             if !seen.insert(key) {
                 return Err(setting("--demand", text, &format!("`{key}` is given twice on {}", self.road.name)));
             }
-            check(flow)
-                .map_err(|wrong| setting("--demand", text, &format!("`{item}` of {}: {wrong}", self.road.name)))?;
+            if !(0.0..=MOST).contains(&flow) {
+                return Err(self.beyond(text, item));
+            }
             let mut has_path = false;
             for (from, entry) in arms.iter().enumerate() {
                 let whole = *entry == key;
@@ -65,6 +64,10 @@ impl Place {
         (0..network.paths.len()).filter(of).map(|path| (path, weight(path))).collect()
     }
 
+    fn beyond(&self, text: &str, item: &str) -> Error {
+        setting("--demand", text, &format!("`{item}` of {} must lie in 0..{MOST} cars an hour", self.road.name))
+    }
+
     fn unknown(&self, text: &str, item: &str) -> Error {
         let arms: Vec<&str> = self.road.arms().collect();
         let expected = format!(
@@ -74,11 +77,6 @@ impl Place {
         );
         setting("--demand", text, &expected)
     }
-}
-
-/// What is wrong with a flow that the flag states (veh/h).
-fn check(flow: f64) -> Result<(), String> {
-    if (0.0..=MOST).contains(&flow) { Ok(()) } else { Err(format!("must lie in 0..{MOST} cars an hour")) }
 }
 
 #[cfg(test)]

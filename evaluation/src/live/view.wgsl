@@ -69,8 +69,8 @@ struct Theme {
     ends: array<vec4<f32>, 10>,
 }
 
-// Where a route's roundabout lies in the picture, or a place and one of its routes. `side` is -1 where the road is driven
-// as its mirror image, which the picture mirrors back, and 1 elsewhere.
+// Where a route's roundabout lies in the picture, or a place and one of its routes. `side` is -1 where the road is
+// driven as its mirror image, which the picture mirrors back, and 1 elsewhere.
 struct Site {
     offset: vec2<f32>,
     side: f32,

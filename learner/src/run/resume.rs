@@ -48,8 +48,7 @@ impl Resumed {
         let file = folder.metrics();
         let metrics = if file.is_file() { MetricsFile::open(file)? } else { MetricsFile::create(file)? };
         if !folder.checkpoint().is_file() {
-            config.override_with(None, minutes, steps, None)?;
-            check_budget(&config, steps)?;
+            give_budget(&mut config, minutes, steps)?;
             return Ok(Resumed { folder, config, metrics, stored: None, has_new_budget });
         }
         let stored = Stored::read(&folder.checkpoint())?;
@@ -60,8 +59,7 @@ impl Resumed {
                 checkpoint_minutes may differ";
             return Err(Error::contents(&folder.config(), message));
         }
-        config.override_with(None, minutes, steps, None)?;
-        check_budget(&config, steps)?;
+        give_budget(&mut config, minutes, steps)?;
         let (seconds, env_steps) = progress::reached(&stored)?;
         let over = config.minutes.is_some_and(|minutes| 60.0 * minutes <= seconds)
             || config.steps.is_some_and(|steps| steps <= env_steps);
@@ -84,8 +82,9 @@ fn refused(path: &Path, expected: String) -> Error {
     Error::setting("--resume", path.display().to_string(), expected)
 }
 
-/// An error if this number of steps is asked for and nothing would be learned in it.
-fn check_budget(config: &Config, steps: Option<u64>) -> Result<(), Error> {
+/// Gives a run another budget; an error if nothing would be learned in it.
+fn give_budget(config: &mut Config, minutes: Option<f64>, steps: Option<u64>) -> Result<(), Error> {
+    config.override_with(None, minutes, steps, None)?;
     steps.map_or(Ok(()), |steps| config.check_budget(Path::new(&format!("--steps {steps}"))))
 }
 

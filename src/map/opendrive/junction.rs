@@ -131,8 +131,8 @@ impl Map {
     ///
     /// # Errors
     ///
-    /// No way, a road or lane that the map does not have, a way that its links do not lead along, junctions too far from
-    /// each other, or ways that would have the same name.
+    /// No way, a road or lane that the map does not have, a way that its links do not lead along, junctions too far
+    /// from each other, or ways that would have the same name.
     pub fn through(&self, ways: &[Way], options: &Options) -> Result<Imported, Error> {
         let name = ways.iter().map(Way::to_string).collect::<Vec<_>>().join(", ");
         let refused = Refusals { reader: Reader::of(&self.file), place: format!("way {}", shown(&name)) };

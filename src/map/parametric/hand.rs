@@ -52,17 +52,11 @@ impl WrittenPoint {
 /// positions are mirrored.
 pub(super) fn as_written(error: Error) -> Error {
     let Error::Invalid { file, key, value, expected } = error else { return error };
-    let swapped = |part: &str| match part {
-        "left" => "right".to_owned(),
-        "right" => "left".to_owned(),
-        part => part.to_owned(),
-    };
-    let key = key.split('.').map(swapped).collect::<Vec<_>>().join(".");
-    let (value, expected) = (lanes_swapped(&value), lanes_swapped(&expected));
+    let [key, value, expected] = [key, value, expected].map(|text| lanes_swapped(&text));
     Error::Invalid { file, key, value, expected: format!("{expected} ({MIRRORED})") }
 }
 
-/// A message in which each lane has the name of the other side: a direction, as in "left of", stays.
+/// A key or a message in which each lane has the name of the other side: a direction, as in "left of", stays.
 fn lanes_swapped(message: &str) -> String {
     let pairs = [("entry.left", "entry.right"), ("exit.left", "exit.right"), ("left lane", "right lane")];
     pairs.iter().fold(message.to_owned(), |message, (left, right)| {

@@ -2,7 +2,6 @@
 
 use std::collections::HashMap;
 use std::fs;
-use std::path::Path;
 use std::sync::Arc;
 
 use offtrack::scenario::Scenario;
@@ -10,19 +9,20 @@ use offtrack::world::World;
 use offtrack_evaluation::live::Ground;
 use serde_json::{Value, json};
 
+use super::left_hand::left_hand;
 use super::page::written;
 use super::visitor::{between, visited};
 use crate::place::{Place, repository};
 
-/// A page of one roundabout, of this file.
-fn page(place: &Place, roundabout: &Path) -> String {
+/// A page of one roundabout, of this text.
+fn page(place: &Place, roundabout: &str) -> String {
     let text = Scenario::text_of("attard2023").unwrap();
     let (before, _) = text.split_once("[[roundabout]]").unwrap();
-    let vehicle = repository().join("scenarios/vehicles");
-    let before = before.replace("vehicles/", &format!("{}/", vehicle.display()));
+    let vehicles = repository().join("scenarios/vehicles");
+    let before = before.replace("vehicles/", &format!("{}/", vehicles.display()));
+    fs::write(place.file("road.toml"), roundabout).unwrap();
     let file = place.file("own.toml");
-    let road = format!("[[roundabout]]\nfile = \"{}\"\ntrain = \"all\"\n", roundabout.display());
-    fs::write(&file, before + &road).unwrap();
+    fs::write(&file, before + "[[roundabout]]\nfile = \"road.toml\"\ntrain = \"all\"\n").unwrap();
     let scenario = Scenario::read(&file).unwrap();
     let world = Arc::new(World::bake(&scenario).unwrap());
     written(vec![Ground { scenario, world, text: None }], Vec::new(), &place.file("trucks.html"))
@@ -31,10 +31,11 @@ fn page(place: &Place, roundabout: &Path) -> String {
 #[test]
 fn a_left_hand_road_is_seen_and_steered_as_it_lies() {
     let place = Place::new();
-    let [right, left] = ["scenarios/roundabouts/16m.toml", "tests/data/roundabouts/left_hand_16m.toml"].map(|file| {
+    let text = fs::read_to_string(repository().join("scenarios/roundabouts/16m.toml")).unwrap();
+    let [right, left] = [text.clone(), left_hand(&text)].map(|text| {
         // Above and below the middle, as the world has it.
         let plan = json!({ "visit": "hand", "points": [[0.0, 40.0], [0.0, -40.0]] });
-        visited(&page(&place, &repository().join(file)), &plan, HashMap::new(), false)
+        visited(&page(&place, &text), &plan, HashMap::new(), false)
     });
     let number = |value: &Value| value.as_f64().unwrap();
     for (found, side) in [(&right, 1.0), (&left, -1.0)] {
