@@ -5,6 +5,7 @@
 mod also_evaluate;
 mod check;
 mod file;
+mod refinement;
 mod rule;
 mod set;
 
@@ -18,6 +19,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::Error;
 
 pub use also_evaluate::AlsoEvaluate;
+pub use refinement::Refinement;
 pub use rule::Rule;
 pub(crate) use rule::driven;
 
@@ -84,10 +86,6 @@ const WRITABLE: &str = "numbers, words and lists of them can all be written as T
 
 fn checkpoint_minutes() -> f64 {
     2.0
-}
-
-fn logit_factor() -> f64 {
-    1.0
 }
 
 /// Where the trucks and the learner are.
@@ -211,51 +209,6 @@ pub struct Learning {
     pub actor_delay: u64,
     /// The entropy term.
     pub entropy: Entropy,
-}
-
-/// The last part of a run: proximal policy optimisation.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Refinement {
-    /// Fraction of the budget after which it begins.
-    pub begin: f64,
-    /// Factor of the logits that it begins with. The most probable action stays; above 1 others become rarer.
-    #[serde(default = "logit_factor")]
-    pub logit_factor: f64,
-    /// Steps of each truck that are learned from at a time.
-    pub n_steps: usize,
-    /// Passes over them.
-    pub epochs: usize,
-    /// Steps in an update.
-    pub batch: usize,
-    /// Discount factor.
-    pub gamma: f64,
-    /// Lambda of the generalised advantage estimates.
-    pub gae_lambda: f64,
-    /// How far the probability of an action may go from what it was, as a fraction, before an update gains nothing.
-    pub clip: f64,
-    /// Coefficient of the entropy beside the standardised advantages.
-    pub entropy_coefficient: f64,
-    /// Adam's learning rate of the actor at the beginning of the refinement.
-    pub actor_learning_rate: f64,
-    /// Adam's learning rate of the value network there.
-    pub critic_learning_rate: f64,
-    /// Fraction of the learning rates that is left at the end; the schedule is linear.
-    pub final_learning_rate_fraction: f64,
-    /// How far the EMA of the actor, which becomes the policy, moves toward the actor in each update.
-    pub actor_ema_rate: f64,
-    /// Most standard deviations that an advantage counts as.
-    pub advantage_limit: f64,
-    /// Iterations in which the value network alone learns.
-    pub critic_iterations: u64,
-    /// Power of the clearance term in the reward.
-    pub clearance_power: f64,
-    /// An episode that runs out of time has failed: it gets the reward of a failure, and has no value after its end.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub late_fails: bool,
-    /// Other weights than those of the run so far in the reward.
-    #[serde(default, skip_serializing_if = "RewardChanges::is_empty")]
-    pub reward: RewardChanges,
 }
 
 /// How the two critics' values are combined.

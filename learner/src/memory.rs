@@ -70,6 +70,7 @@ fn parts(config: &Config, n_values: u128, n_actions: u128) -> [Part; 6] {
     // Found from a copy of all of them and, with a mirror, their images.
     let normalised = if learning.mirror_augmentation { 4 } else { 1 };
     let refined = refinement.as_ref().map_or(0, |Refinement { n_steps, .. }| *n_steps as u128 * n_envs);
+    let n_frames = refinement.as_ref().map_or(1, |refinement| refinement.frames as u128);
     let part = |key, value, bytes| Part { key, value, bytes };
     [
         part(
@@ -94,7 +95,7 @@ fn parts(config: &Config, n_values: u128, n_actions: u128) -> [Part; 6] {
         part(
             "refinement.n_steps",
             refinement.as_ref().map_or(0, |of| of.n_steps).to_string(),
-            2 * refined * (observation + 32),
+            2 * refined * (n_frames * observation + 32),
         ),
     ]
 }
@@ -141,6 +142,12 @@ mod tests {
                 "lane",
                 &["refinement.n_steps=10000", "n_envs=20000", "replay_buffer.capacity=1000000"],
                 "refinement.n_steps: 10000;",
+            ),
+            // One frame would fit.
+            (
+                "lane",
+                &["refinement.frames=20", "n_envs=20000", "replay_buffer.capacity=1000000"],
+                "refinement.n_steps: 64;",
             ),
         ] {
             let message = checked(file, settings, 4).unwrap_err();

@@ -83,6 +83,14 @@ impl Mlp {
         output
     }
 
+    /// This network for `n_frames` observations side by side, the newest last: it sees that one alone, until it learns.
+    pub fn over_frames(&self, n_frames: usize, device: &Device) -> Mlp {
+        let mut parameters: Vec<Vec<f32>> = self.parameters().into_iter().map(|(_, values)| values).collect();
+        let older = (n_frames - 1) * parameters[0].len();
+        parameters[0].splice(..0, std::iter::repeat_n(0.0, older));
+        self.with_parameters(parameters, device)
+    }
+
     /// Every parameter with its name, in the order in which a module shows them.
     pub fn parameters(&self) -> Vec<(String, Vec<f32>)> {
         let layers = self.layers.iter().zip(1..).flat_map(|(layer, number)| {
@@ -110,7 +118,7 @@ impl Mlp {
         self.with_parameters(parameters, device)
     }
 
-    /// A network of the same sizes with other parameters, as many and as long as [`Mlp::parameters`] gives.
+    /// A network with other parameters, as many as [`Mlp::parameters`] gives; its first layer may have other inputs.
     pub fn with_parameters(&self, parameters: Vec<Vec<f32>>, device: &Device) -> Mlp {
         let mut parameters = parameters.into_iter();
         let mut next = || parameters.next().unwrap_or_default();

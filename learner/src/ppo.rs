@@ -62,11 +62,11 @@ struct ShardGradients {
 }
 
 impl Ppo {
-    /// Goes on from this actor, with a network of values that knows nothing yet.
+    /// Goes on from this actor of one observation, with a network of values that knows nothing yet.
     pub fn new(settings: &Refinement, actor: &Mlp, seed: u64) -> Result<Ppo, Error> {
         let device = Device::flex();
         let rng = &mut SmallRng::seed_from_u64(seed);
-        let actor = actor.times(settings.logit_factor as f32, &device);
+        let actor = actor.times(settings.logit_factor as f32, &device).over_frames(settings.frames, &device);
         let mut sizes: Vec<usize> = actor.layers.iter().map(|layer| layer.weight.dims()[0]).collect();
         sizes.push(1);
         Ok(Ppo {

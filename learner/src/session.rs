@@ -9,7 +9,7 @@ use offtrack_policy::{Activation, Frames, Head, Layer, Normalisation, Policy};
 
 use super::backend::Backend;
 use super::checkpoint::{Columns, Stored};
-use super::config::Config;
+use super::config::{Config, Refinement};
 use super::mirror::Mirror;
 use super::network::Mlp;
 use super::ppo::Ppo;
@@ -205,6 +205,12 @@ impl Session {
         self.rollout.found_normalisation(self.mirror.as_ref())
     }
 
+    /// What the policy sees: one observation, until a refinement that shows it several.
+    fn frames(&self) -> Frames {
+        let refinement = self.config.refinement.as_ref().filter(|_| self.is_refining());
+        refinement.map_or_else(Frames::default, Refinement::seen)
+    }
+
     /// The policy: the EMA of the actor that learns now. Waits for a device.
     pub fn policy(&self) -> Result<Policy, Error> {
         Ok(Policy {
@@ -222,7 +228,7 @@ impl Session {
             activation: Activation::Relu,
             head: Head::Levels,
             values: None,
-            frames: Frames::default(),
+            frames: self.frames(),
             recurrent: None,
         })
     }

@@ -29,8 +29,12 @@ impl Default for Frames {
 
 impl Frames {
     /// Adds a truck's newest frame behind the others, which move up by one: the oldest goes. `stack` is
-    /// `[frames * values]`, oldest first.
-    pub(crate) fn push(self, stack: &mut [f32], frame: &[f32], begins: bool) {
+    /// `[frames * values]`, oldest first. Where an episode `begins`, what was there goes too.
+    ///
+    /// # Panics
+    ///
+    /// Where a frame is longer than the stack.
+    pub fn push(self, stack: &mut [f32], frame: &[f32], begins: bool) {
         let newest = stack.len() - frame.len();
         match (begins, self.padding) {
             (false, _) => stack.copy_within(frame.len().., 0),

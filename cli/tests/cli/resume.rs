@@ -27,7 +27,7 @@ pub fn place() -> Place {
 
 /// Lets runs end with a refinement, from a quarter on.
 pub fn refine(place: &Place) {
-    let refinement = "[refinement]\nbegin = 0.25\nn_steps = 8\nepochs = 2\nbatch = 32\ngamma = 0.97\n\
+    let refinement = "[refinement]\nbegin = 0.25\nframes = 3\nn_steps = 8\nepochs = 2\nbatch = 32\ngamma = 0.97\n\
                       gae_lambda = 0.9\nclip = 0.2\nadvantage_limit = 4.0\nentropy_coefficient = 0.003\n\
                       actor_learning_rate = 3e-4\ncritic_learning_rate = 1e-3\nfinal_learning_rate_fraction = 0.1\n\
                       actor_ema_rate = 0.1\ncritic_iterations = 4\nclearance_power = 2.0\n\

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use offtrack::files::reader::Reader;
 
-use super::{Config, Device, Learning, Refinement};
+use super::{Config, Device, Learning};
 use crate::error::Error;
 
 impl Config {
@@ -128,33 +128,6 @@ impl Learning {
         }
         reader.within("learning.entropy.coefficient", self.entropy.coefficient, 1e-9..=1e3, "")?;
         reader.within("learning.entropy.learning_rate", self.entropy.learning_rate, 1e-8..=1.0, "")?;
-        Ok(())
-    }
-}
-
-impl Refinement {
-    fn check(&self, reader: &Reader) -> Result<(), Error> {
-        reader.within("refinement.begin", self.begin, 0.0..=0.99, "")?;
-        reader.within("refinement.logit_factor", self.logit_factor, 0.01..=100.0, "")?;
-        reader.count("refinement.n_steps", self.n_steps, 1..=10_000)?;
-        reader.count("refinement.epochs", self.epochs, 1..=100)?;
-        reader.count("refinement.batch", self.batch, 2..=1 << 20)?;
-        reader.within("refinement.gamma", self.gamma, 0.0..=1.0, "")?;
-        reader.within("refinement.gae_lambda", self.gae_lambda, 0.0..=1.0, "")?;
-        reader.within("refinement.clip", self.clip, 0.001..=10.0, "")?;
-        reader.within("refinement.advantage_limit", self.advantage_limit, 0.1..=1e6, "standard deviations")?;
-        reader.within("refinement.entropy_coefficient", self.entropy_coefficient, 0.0..=1e3, "")?;
-        reader.within("refinement.actor_learning_rate", self.actor_learning_rate, 1e-8..=1.0, "")?;
-        reader.within("refinement.critic_learning_rate", self.critic_learning_rate, 1e-8..=1.0, "")?;
-        reader.within("refinement.final_learning_rate_fraction", self.final_learning_rate_fraction, 0.0..=1.0, "")?;
-        reader.within("refinement.actor_ema_rate", self.actor_ema_rate, 1e-6..=1.0, "")?;
-        reader.within("refinement.critic_iterations", self.critic_iterations as f64, 0.0..=1e9, "iterations")?;
-        reader.within("refinement.clearance_power", self.clearance_power, 0.1..=10.0, "")?;
-        self.reward.check(reader, "refinement.reward")?;
-        if let Some(apron) = self.reward.apron {
-            let expected = "an apron weighs what it does in the run: set reward.apron";
-            return Err(reader.invalid("refinement.reward.apron", apron, expected).into());
-        }
         Ok(())
     }
 }

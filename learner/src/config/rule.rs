@@ -2,10 +2,12 @@
 
 use offtrack::files::reader::Reader;
 use offtrack::scenario::Scenario;
+use offtrack::simulator::Engine;
 use offtrack::world::World;
+use offtrack_evaluation::placed::placed;
 use offtrack_evaluation::policies::Controller;
 use offtrack_evaluation::policies::rule::{self, Capped, FOLLOWS, YIELDS};
-use offtrack_policy::Policy;
+use offtrack_policy::{Choice, Policy};
 use serde::{Deserialize, Serialize};
 
 use super::Config;
@@ -57,8 +59,9 @@ impl Config {
 
 /// Drives as the policy does, under a rule if there is one.
 pub(crate) fn driven(policy: Policy, rule: Option<Rule>, world: &World) -> Result<Box<dyn Controller>, Error> {
+    let policy = placed(policy, &Engine::Cpu, world, Choice::Best)?;
     Ok(match rule {
-        Some(rule) => Box::new(Capped::new(rule.name(), Box::new(policy), world)?),
-        None => Box::new(policy),
+        Some(rule) => Box::new(Capped::new(rule.name(), policy, world)?),
+        None => policy,
     })
 }

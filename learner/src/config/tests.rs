@@ -84,6 +84,7 @@ fn a_refinements_value_out_of_its_range_is_refused_with_its_key() {
     for (setting, expected) in [
         ("refinement.begin=1.0", "refinement.begin: 1; must lie in 0..0.99"),
         ("refinement.logit_factor=0.0", "refinement.logit_factor: 0; must lie in 0.01..100"),
+        ("refinement.frames=0", "refinement.frames: 0; must lie in 1..64"),
         ("refinement.n_steps=0", "refinement.n_steps: 0; must lie in 1.."),
         ("refinement.epochs=0", "refinement.epochs: 0; must lie in 1.."),
         ("refinement.batch=1", "refinement.batch: 1; must lie in 2.."),

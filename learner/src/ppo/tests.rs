@@ -7,6 +7,7 @@ fn settings() -> Refinement {
     Refinement {
         begin: 0.0,
         logit_factor: 1.0,
+        frames: 1,
         n_steps: 4,
         epochs: 2,
         batch: 16,

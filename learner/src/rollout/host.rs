@@ -28,10 +28,12 @@ use crate::ppo::steps::Steps;
 use crate::replay_buffer::{ReplayBuffer, Rows};
 use crate::sac::Transitions;
 
+mod stacks;
 mod tensors;
 #[cfg(test)]
 mod tests;
 
+use stacks::Stacks;
 use tensors::logits_of_normalised;
 pub use tensors::{logits, shards};
 
@@ -75,6 +77,8 @@ pub struct HostRollout<const N: usize> {
     /// None without mirror augmentation.
     mirror: Option<Mirror>,
     normalisation: Normalisation,
+    /// What a refinement's networks observe: the last frames of each truck.
+    stacks: Stacks,
     /// Observations before the step in hand.
     observation: Vec<[f32; N]>,
     /// Routes of the step in hand; after it, trucks whose episodes ended are on others.
@@ -111,6 +115,7 @@ impl<const N: usize> HostRollout<N> {
             sampling: stream(2),
             mirror,
             normalisation: Normalisation::none(N),
+            stacks: Stacks::default(),
             observation: Vec::new(),
             routes: Vec::new(),
             sampled_rows: Vec::new(),
@@ -242,12 +247,14 @@ impl<const N: usize> Rollout for HostRollout<N> {
         let mut weights = own;
         settings.reward.apply_to_world(&mut weights);
         let late_fails = settings.late_fails;
-        let mut steps = Steps { n_envs, n_values: N, late_fails, ..Steps::default() };
+        let n_values = settings.frames * N;
+        let mut steps = Steps { n_envs, n_values, late_fails, ..Steps::default() };
         for step in 0..n_steps {
             self.begin_step();
-            let normalised = self.normalisation.apply(&self.observation);
-            steps.observation.extend_from_slice(&normalised);
-            let logits = logits_of_normalised(actor, normalised, N);
+            let frames = self.normalisation.apply(&self.observation);
+            let stacked = self.stacks.push(settings.seen(), &frames, &self.simulator.batch().ended);
+            steps.observation.extend_from_slice(stacked);
+            let logits = logits_of_normalised(actor, stacked.to_vec(), n_values);
             let actions = sampled(&logits, n_actions, &mut self.acting);
             steps.log_prob.extend(
                 logits.chunks_exact(n_actions).zip(&actions).map(|(row, &action)| softmax(row).1[action as usize]),
@@ -278,7 +285,8 @@ impl<const N: usize> Rollout for HostRollout<N> {
             let next = observed::<N>(&batch.next_observation, &batch.next_extras, &batch.next_around);
             for (env, next) in next.iter().enumerate() {
                 if steps.needs_next(step * n_envs + env, n_steps * n_envs) {
-                    steps.next_observation.extend(self.normalisation.apply(std::slice::from_ref(next)));
+                    let frame = self.normalisation.apply(std::slice::from_ref(next));
+                    steps.next_observation.extend(self.stacks.next(settings.seen(), env, &frame));
                 }
             }
             self.count()?;
@@ -334,6 +342,7 @@ impl<const N: usize> Rollout for HostRollout<N> {
         columns.put("rollout, acting", &self.acting.state[..]);
         columns.put("rollout, sampling", &self.sampling.state[..]);
         columns.put("rollout, episode rewards", &self.episode_rewards[..]);
+        self.config.refinement.iter().for_each(|refinement| self.stacks.save(refinement.frames, columns));
         self.level_replay.iter().for_each(|replay| replay.save(columns));
         self.replay_buffer.save(columns);
     }
@@ -345,6 +354,9 @@ impl<const N: usize> Rollout for HostRollout<N> {
         (self.acting, self.sampling) =
             (Generator::stored(stored, "rollout, acting")?, Generator::stored(stored, "rollout, sampling")?);
         self.episode_rewards = stored.exactly("rollout, episode rewards", self.config.n_envs)?;
+        if let Some(refinement) = &self.config.refinement {
+            self.stacks.restore(stored, self.config.n_envs * refinement.frames * N)?;
+        }
         if let Some(replay) = &mut self.level_replay {
             replay.restore(stored)?;
             self.simulator.draw_from(replay.list())?;

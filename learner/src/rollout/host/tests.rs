@@ -82,6 +82,66 @@ fn networks_observe_the_values_the_first_extras_and_then_the_vehicles() {
     assert_eq!(observed::<N_VALUES>(&values, &extras, &[]).len(), 2);
 }
 
+#[test]
+fn a_refinement_sees_the_last_frames_of_an_episode_as_its_policy_will() {
+    const N_FRAMES: usize = 3;
+    let settings = ["refinement.n_steps=1", "refinement.late_fails=false"].map(str::to_owned);
+    let (mut alone, actor) = rollout(&settings);
+    let (mut several, _) = rollout(&[&settings[..], &[format!("refinement.frames={N_FRAMES}")]].concat());
+    let [one, three] = [&alone, &several].map(|rollout| rollout.config.refinement.clone().unwrap());
+    // It sees what it saw before.
+    let over_frames = actor.over_frames(N_FRAMES, &Device::flex());
+    // And one for which the older frames count.
+    let mut parameters: Vec<Vec<f32>> = over_frames.parameters().into_iter().map(|(_, values)| values).collect();
+    let older = parameters[0].len() / N_FRAMES * (N_FRAMES - 1);
+    parameters[0][..older].iter_mut().zip(0..).for_each(|(weight, index)| *weight = 0.01 * (index as f32).sin());
+    let mixed = over_frames.with_parameters(parameters, &Device::flex());
+    let policy =
+        Policy { frames: three.seen(), layers: mixed.plain_layers(), ..Policy::shipped("attard2023").unwrap() };
+    let (mut driver, envs) = (policy.driver(N_ENVS), Vec::from_iter(0..N_ENVS));
+    let mut seen = vec![Vec::new(); N_ENVS];
+    let mut n_begun = 0;
+    for step in 0..N_STEPS {
+        let batch = several.simulator.batch();
+        let begun: Vec<usize> = envs.iter().copied().filter(|&env| batch.truck[env].steps == 0).collect();
+        assert!(0 < step || begun == envs, "all begin");
+        n_begun += begun.len();
+        begun.into_iter().for_each(|env| driver.begin(env));
+        let outputs = driver.outputs(&envs, &batch.observation, &batch.extras);
+        let expected = alone.collect(&actor, &one).unwrap();
+        let steps = several.collect(&over_frames, &three).unwrap();
+        assert_eq!((&steps.action, &steps.ended), (&expected.action, &expected.ended));
+        assert_eq!(steps.n_values, N_FRAMES * N_VALUES);
+        for (env, stack) in steps.observation.chunks_exact(steps.n_values).enumerate() {
+            let newest = &expected.observation[env * N_VALUES..][..N_VALUES];
+            if seen[env].is_empty() {
+                seen[env] = vec![newest.to_vec(); N_FRAMES - 1];
+            }
+            seen[env].push(newest.to_vec());
+            assert_eq!(stack, seen[env][seen[env].len() - N_FRAMES..].concat(), "step {step}, truck {env}");
+        }
+        let logits = logits_of_normalised(&mixed, steps.observation.clone(), steps.n_values);
+        let largest = logits.iter().fold(0.0f32, |most, logit| most.max(logit.abs()));
+        let are_close = |(a, b): (&f32, &f32)| (a - b).abs() < 1e-5 * largest;
+        assert!(outputs.iter().zip(&logits).all(are_close), "step {step}");
+        // What comes next is one frame more, of trucks that go on.
+        let mut next = steps.next_observation.chunks_exact(steps.n_values);
+        let mut alone = expected.next_observation.chunks_exact(N_VALUES);
+        for env in envs.iter().copied().filter(|&env| steps.needs_next(env, N_ENVS)) {
+            let newest = alone.next().unwrap();
+            let older = &seen[env][seen[env].len() + 1 - N_FRAMES..];
+            assert_eq!(next.next().unwrap(), [&older.concat(), newest].concat());
+        }
+        assert!(next.next().is_none() && alone.next().is_none());
+        for (env, ended) in steps.ended.iter().enumerate() {
+            if *ended != Ended::Running {
+                seen[env].clear();
+            }
+        }
+    }
+    assert!(2 * N_ENVS < n_begun, "{n_begun} episodes");
+}
+
 /// A truck's values among other vehicles.
 const AMONG: usize = N_VALUES + N_AROUND;
 
