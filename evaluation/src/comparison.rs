@@ -303,7 +303,7 @@ impl Group {
         Some(GroupDifference {
             kind: self.kind,
             name: self.name.clone(),
-            routes: self.routes.len(),
+            routes: of_first.n_routes(),
             starts: of_first.episodes() / first.files.len(),
             first: of_first.mean()?,
             own: of_own.mean()?,

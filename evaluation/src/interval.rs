@@ -64,6 +64,11 @@ impl Cells {
         *cell = plus(*cell, Cell { sum: value, n: 1.0 });
     }
 
+    /// Number of routes.
+    pub fn n_routes(&self) -> usize {
+        self.n_routes
+    }
+
     /// Episodes of all seeds.
     pub fn episodes(&self) -> usize {
         self.total().n as usize
@@ -188,7 +193,8 @@ fn tail(sides: &[(f64, &Cells)]) -> Option<f64> {
     if variance < 1e-24 {
         return Some(0.5);
     }
-    let freedom = (variance * variance / squares) as usize;
+    // Of a single part it is a whole number, but for the last bits.
+    let freedom = (variance * variance / squares + 1e-9) as usize;
     Some(normal_tail(student_t(freedom.max(1)) * (variance / of_resamples).sqrt()))
 }
 

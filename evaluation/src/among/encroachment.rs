@@ -59,12 +59,6 @@ impl Encroachments {
         let now = self.rears.len();
         self.rears.push(rear);
         let mut times = Vec::new();
-        for (&(path, number), &left) in &self.left {
-            let place = network.zones_of(view.path, path).get(number).and_then(Place::of);
-            times.extend(
-                place.filter(|place| self.front < place.truck[0] && place.truck[0] <= front).map(|_| now - left),
-            );
-        }
         let arm = network.source_of(view.path).entry;
         let comes_from_there = |car: &Car| network.source_of(car.path()).entry == arm;
         for (slot, car) in row.cars.iter().enumerate().filter(|(_, car)| car.is_there() && !comes_from_there(car)) {
@@ -85,6 +79,13 @@ impl Encroachments {
                     self.left.insert((car.path(), number), now);
                 }
             }
+        }
+        // Also behind a vehicle that left in this step.
+        for (&(path, number), &left) in &self.left {
+            let place = network.zones_of(view.path, path).get(number).and_then(Place::of);
+            times.extend(
+                place.filter(|place| self.front < place.truck[0] && place.truck[0] <= front).map(|_| now - left),
+            );
         }
         self.front = front;
         self.cars = row.cars.to_vec();

@@ -178,6 +178,9 @@ fn post_encroachment_time_is_that_from_when_one_has_left_the_place_until_the_oth
         let last = [(at[0] + 0.1, car_after), (at[0] + 0.2, car_after)];
         let found = encroached(&world, path, &[&fronts[..], &last].concat());
         assert_eq!(found, [None, None, None, None, Some(3), None], "{kind:?}");
+        // The vehicle leaves in the step in which the truck comes.
+        let fronts = [(before, car_before), (at[0] + 0.1, car_after), (at[0] + 0.2, car_after)];
+        assert_eq!(encroached(&world, path, &fronts), [None, Some(0), None], "{kind:?}");
         // The truck leaves in the second step, the vehicle comes in the fourth.
         let fronts = [(before, car_before), (after, car_before), (after, car_before), (after, of_car[0] + 0.1)];
         assert_eq!(encroached(&world, path, &fronts), [None, None, None, Some(2)], "{kind:?}");

@@ -101,6 +101,27 @@ fn a_contact_that_braking_avoids_is_avoidable_and_one_a_step_away_at_speed_is_no
 }
 
 #[test]
+fn a_truck_that_touches_nothing_until_its_time_is_over_has_avoided_the_contact() {
+    let blind = Blind::new();
+    let found = blind.avoidable(&[3.0]).unwrap();
+    let pairs = blind.again().into_iter().zip(found.contacts).filter(|(_, found)| found.avoidable_from.is_some());
+    let mut n_tried = 0;
+    for (again, _) in pairs {
+        let n = again.contact.actions.len();
+        let mut world = World::clone(&blind.world);
+        world.step_limits.iter_mut().for_each(|limit| *limit = n as u32 + 1);
+        let again = Again { world: &Arc::new(world), ..again };
+        let found = PASSES.iter().find_map(|&pass| again.avoided(n - 30, n + 30, pass).unwrap().0).unwrap();
+        let actions = [&again.contact.actions[..n - 30], &found].concat();
+        // The step in which its time is over is the first beyond the limit.
+        assert_eq!(actions.len(), n + 2);
+        assert!(again.comes_through(&actions).unwrap());
+        n_tried += 1;
+    }
+    assert!(0 < n_tried);
+}
+
+#[test]
 fn the_same_contacts_are_found_avoidable_whatever_the_number_of_threads() {
     let blind = Blind::new();
     let found = |threads: usize| {

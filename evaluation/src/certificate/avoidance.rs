@@ -64,15 +64,17 @@ impl Again<'_> {
         Ok(ended.iter().zip(truck).all(|(&ended, truck)| ended == *end as u32 && bytes_of(truck) == bytes_of(last)))
     }
 
-    /// Whether the truck still drives after these actions from its start on, or has arrived.
+    /// Whether the truck still drives after these actions from its start on, has arrived, or has driven until its time
+    /// was over.
     pub fn comes_through(&self, actions: &[u32]) -> Result<bool, Error> {
         let mut copies = self.begun()?;
         actions.iter().try_for_each(|&action| copies.step(&[action]))?;
-        Ok([Ended::Running, Ended::Arrived].map(|end| end as u32).contains(&copies.batch().ended[0]))
+        Ok(copies.batch().ended[0] == Ended::Running as u32 || is_over(copies.batch().ended[0]))
     }
 
     /// Searches for actions from `step` steps after the start on after which the truck still drives `until` steps after
-    /// its start, or has arrived: none where a beam finds none. Beside it are the env steps of the search.
+    /// its start, or its episode has ended without a failure: none where a beam finds none. Beside it are the env steps
+    /// of the search.
     pub fn avoided(&self, step: usize, until: usize, pass: Pass) -> Result<(Option<Vec<u32>>, u64), Error> {
         let recorded = &self.contact.actions[step..];
         let straight = nearest_to_straight(self.world);
@@ -93,7 +95,7 @@ impl Again<'_> {
                     let near = if self.lacks_room(batch, env) { ROOM_WEIGHT } else { 0.0 };
                     child.follow(actions[env], cost(self.world, batch, env, 0.0) + near);
                 }
-                if let Some(env) = batch.ended.iter().position(|&ended| ended == Ended::Arrived as u32) {
+                if let Some(env) = batch.ended.iter().position(|&ended| is_over(ended)) {
                     children[env].actions.push(actions[env]);
                     return Ok((Some(children.swap_remove(env).actions), env_steps));
                 }
@@ -140,6 +142,11 @@ impl Again<'_> {
         let mut cars = Row::of(words).cars.iter().filter(|car| car.is_there()).flat_map(|car| car.outlines(network));
         cars.any(|car| units.iter().any(|unit| unit.overlaps(&car)))
     }
+}
+
+/// Whether an episode has ended without a failure: the truck has arrived, or its time is over.
+fn is_over(ended: u32) -> bool {
+    [Ended::Arrived, Ended::TimedOut].map(|end| end as u32).contains(&ended)
 }
 
 /// Both units with the room around them.

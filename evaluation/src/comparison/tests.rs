@@ -85,6 +85,20 @@ fn success_is_compared_by_vehicle_and_load_where_there_are_several() {
         .collect();
     assert_eq!(classes, [("daf, empty", 4, 1.0), ("daf, laden", 4, 0.5)]);
     assert!(comparison.text().contains("| vehicle, load | daf, laden "), "{}", comparison.text());
+    // Laden trucks on one route alone say nothing of others.
+    let on_one = |routes: &[&str]| {
+        let mut side = with_classes(routes);
+        side.files[0].1.outcomes.routes[1].class = vec![0; 4];
+        side
+    };
+    let comparison = Comparison::of(&[on_one(&["....", "...."]), on_one(&[".r..", "...."])]);
+    let of = |name: &str| {
+        let mut groups = comparison.differences[0].groups.iter();
+        groups.find(|group| group.kind == "class" && group.name == name).unwrap().clone()
+    };
+    let (empty, laden) = (of("daf, empty"), of("daf, laden"));
+    assert_eq!((empty.routes, empty.difference.low, empty.difference.high), (2, Some(0.0), Some(0.0)));
+    assert_eq!((laden.routes, laden.starts, laden.difference.mean, laden.difference.low), (1, 2, -0.5, None));
 }
 
 #[test]
