@@ -7,7 +7,7 @@ use offtrack::scenario::Split;
 use offtrack_evaluation::actions;
 use offtrack_evaluation::avoidable::{self, contacts};
 use offtrack_evaluation::certificate::attempt::{HOLD, passes};
-use offtrack_evaluation::certificate::{certified, check_table};
+use offtrack_evaluation::certificate::{certified, check_delay, check_table};
 use offtrack_evaluation::comparison::Asked;
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::failures::Example;
@@ -148,6 +148,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let world = roads::world(&scenario)?;
     if args.certify {
         check_table(&world)?;
+        check_delay(&world)?;
     }
     if let Some(seconds) = &args.avoidable {
         avoidable::check(&scenario, &world, seconds)?;

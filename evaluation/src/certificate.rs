@@ -12,6 +12,7 @@ use std::collections::HashSet;
 use std::path::Path;
 use std::sync::Arc;
 
+use offtrack::layout::Disturbances;
 use offtrack::scenario::Scenario;
 use offtrack::world::World;
 
@@ -27,7 +28,20 @@ pub fn check_levels(world: &World) -> Result<(), Error> {
             .to_owned();
         return Err(Error::Setting { name: "[traffic]", value: "vehicles around each truck".to_owned(), expected });
     }
-    check_table(world)
+    check_table(world)?;
+    check_delay(world)
+}
+
+/// An error for a world in which actions come late by a number of steps that differs between trucks: what one candidate
+/// did would not do for another.
+pub fn check_delay(world: &World) -> Result<(), Error> {
+    let Disturbances { action_delay, n_action_delays, .. } = world.disturbances;
+    if n_action_delays == 1 {
+        return Ok(());
+    }
+    let expected = "a search needs actions that come equally late everywhere: the same benchmark with one number twice";
+    let value = format!("[{action_delay}, {}]", action_delay + n_action_delays - 1);
+    Err(Error::Setting { name: "disturbances.action_delay", value, expected: expected.to_owned() })
 }
 
 /// An error for a world whose actions are continuous: a search tries every action of a table.
@@ -75,4 +89,23 @@ fn verified(
         return Err(Error::contents(path, message));
     }
     Ok((certificate, sequences))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_search_is_refused_where_trucks_answer_by_different_delays() {
+        let mut scenario = Scenario::named("attard2023").unwrap();
+        scenario.retain(|_, route| route.name == "20m/E-right-1");
+        let mut delayed = |least: u32, greatest: u32| {
+            scenario.disturbances.action_delay = [least, greatest];
+            World::bake(&scenario).unwrap()
+        };
+        check_levels(&delayed(2, 2)).unwrap();
+        let error = check_levels(&delayed(0, 3)).unwrap_err().to_string();
+        assert!(error.starts_with("disturbances.action_delay: [0, 3]; "), "{error}");
+        assert!(check_delay(&delayed(1, 2)).is_err());
+    }
 }

@@ -242,7 +242,9 @@ fn conditions(scenario: &Scenario, world: &World) -> BTreeMap<String, String> {
         scenario.start_speed.map(|[least, greatest]| ("start speed", format!("{least:.4} to {greatest:.4} m/s")));
     let changes = (!scenario.speed_changes.is_empty())
         .then(|| ("target speeds", list(&mut [params.target_speed_min, params.target_speed_max].into_iter())));
-    let later = [fleet, clock, start, changes].into_iter().flatten();
+    let delay =
+        (world.disturbances.of_action == 1).then(|| ("action delay", world.disturbances.action_delay.to_string()));
+    let later = [fleet, clock, start, changes, delay].into_iter().flatten();
     entries.into_iter().chain(later).map(|(key, value)| (key.to_owned(), value)).collect()
 }
 
