@@ -113,11 +113,19 @@ fn training_run(folder: &Path) -> Result<TrainingRun, Error> {
             left.display()
         )));
     }
+    let last = Policy::load(&left)?;
+    if last.has_memory() {
+        return Err(wrong(format!(
+            "its policy sees {} observations, as refinement.frames has it, and a page drives by the latest alone: a \
+             run without it is needed",
+            last.frames.n
+        )));
+    }
     let kept = kept::read(folder)?;
     let load = |kept: &Kept| Ok((*kept, Policy::load(&kept.file(folder))?));
     let kept = kept.iter().map(load).collect::<Result<Vec<_>, Error>>()?;
     let name = folder.file_name().map_or_else(|| shown_path(folder), |name| name.to_string_lossy().into_owned());
-    Ok(TrainingRun { name, kept, left: Policy::load(&left)? })
+    Ok(TrainingRun { name, kept, left: last })
 }
 
 /// What the parts of the file weigh.

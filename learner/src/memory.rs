@@ -1,7 +1,8 @@
-//! The memory that a run on the processor takes, reckoned before it begins. Linux grants memory that it does not have
+//! The memory that a run on the processor takes, and its policy's file, reckoned before it begins. Linux grants memory that it does not have
 //! and ends the process that uses it, and an allocation that is refused ends the process too.
 
 use offtrack::simulator::available_memory;
+use offtrack_policy::FILE_LIMIT;
 
 use super::config::{Config, Refinement};
 use crate::error::Error;
@@ -60,17 +61,17 @@ fn parts(config: &Config, n_values: u128, n_actions: u128) -> [Part; 6] {
     let (n_envs, batch) = (config.n_envs as u128, learning.batch as u128);
     let observation = F32 * n_values;
     let hidden: Vec<u128> = learning.hidden.iter().map(|&size| size as u128).collect();
-    let sizes = [&[n_values], &hidden[..], &[n_actions]].concat();
-    let weights: u128 = sizes.windows(2).map(|pair| (pair[0] + 1) * pair[1]).sum();
+    let weights = |n_inputs: u128| n_weights(config, n_inputs, n_actions);
     let widest = hidden.iter().copied().max().unwrap_or_default();
     let rows = replay_buffer.capacity.div_ceil(config.n_envs) as u128 * n_envs;
     // A tree of sums over a power of two.
     let tree = if replay_buffer.priority.is_some() { 2 * rows.next_power_of_two() * 8 } else { 0 };
-    let copies = COPIES + refinement.as_ref().map_or(0, |_| REFINED_COPIES);
     // Found from a copy of all of them and, with a mirror, their images.
     let normalised = if learning.mirror_augmentation { 4 } else { 1 };
     let refined = refinement.as_ref().map_or(0, |Refinement { n_steps, .. }| *n_steps as u128 * n_envs);
-    let n_frames = refinement.as_ref().map_or(1, |refinement| refinement.frames as u128);
+    let n_frames = n_frames(config);
+    let refined_copies = refinement.as_ref().map_or(0, |_| REFINED_COPIES);
+    let copied = COPIES * weights(n_values) + refined_copies * weights(n_frames * n_values);
     let part = |key, value, bytes| Part { key, value, bytes };
     [
         part(
@@ -83,14 +84,14 @@ fn parts(config: &Config, n_values: u128, n_actions: u128) -> [Part; 6] {
             replay_buffer.warmup.to_string(),
             replay_buffer.warmup as u128 * observation * normalised,
         ),
-        part("learning.hidden", format!("{:?}", learning.hidden), copies * weights * F32),
+        part("learning.hidden", format!("{:?}", learning.hidden), copied * F32),
         // Three networks forward and backward, each layer's output kept.
         part(
             "learning.batch",
             learning.batch.to_string(),
             batch * (6 * observation + 9 * F32 * hidden.iter().sum::<u128>()),
         ),
-        part("n_envs", config.n_envs.to_string(), n_envs * (TRUCK + 3 * observation + 2 * F32 * widest)),
+        part("n_envs", config.n_envs.to_string(), n_envs * (TRUCK + (3 + n_frames) * observation + 2 * F32 * widest)),
         // Twice while a list of them grows.
         part(
             "refinement.n_steps",
@@ -98,6 +99,34 @@ fn parts(config: &Config, n_values: u128, n_actions: u128) -> [Part; 6] {
             2 * refined * (n_frames * observation + 32),
         ),
     ]
+}
+
+/// Weights and biases of the policy's network with so many inputs.
+fn n_weights(config: &Config, n_inputs: u128, n_actions: u128) -> u128 {
+    let hidden = config.learning.hidden.iter().map(|&size| size as u128);
+    let sizes: Vec<u128> = [n_inputs].into_iter().chain(hidden).chain([n_actions]).collect();
+    sizes.windows(2).map(|pair| (pair[0] + 1) * pair[1]).sum()
+}
+
+/// Observations that the policy sees in the end.
+fn n_frames(config: &Config) -> u128 {
+    config.refinement.as_ref().map_or(1, |refinement| refinement.frames as u128)
+}
+
+/// An error if the policy's file would be larger than one that is read.
+pub fn check_policy(config: &Config, n_values: usize, n_actions: usize) -> Result<(), Error> {
+    let bytes = F32 * n_weights(config, n_frames(config) * n_values as u128, n_actions as u128);
+    if bytes <= u128::from(FILE_LIMIT) {
+        return Ok(());
+    }
+    let megabytes = |bytes: u128| format!("{:.1} MB", bytes as f64 / 1e6);
+    let expected = format!(
+        "the policy's file would have {}, and one of at most {} is read: smaller layers would do, or fewer \
+         refinement.frames",
+        megabytes(bytes),
+        megabytes(FILE_LIMIT.into())
+    );
+    Err(Error::setting("learning.hidden", format!("{:?}", config.learning.hidden), expected))
 }
 
 fn gigabytes(bytes: u128) -> String {
@@ -143,6 +172,11 @@ mod tests {
                 &["refinement.n_steps=10000", "n_envs=20000", "replay_buffer.capacity=1000000"],
                 "refinement.n_steps: 10000;",
             ),
+            (
+                "lane",
+                &["refinement.frames=64", "refinement.n_steps=8", "learning.hidden=[8192]", "n_envs=64"],
+                "learning.hidden: [8192];",
+            ),
             // One frame would fit.
             (
                 "lane",
@@ -161,6 +195,22 @@ mod tests {
             "default best lane attard as-run laden laden-50 transfer transfer-refined traffic traffic-refined paper";
         for file in files.split(' ') {
             assert_eq!(checked(file, &[], 2), Ok(()), "{file}");
+        }
+    }
+
+    #[test]
+    fn a_policy_that_no_command_would_read_is_refused_before_it_is_learned() {
+        for (settings, fits) in [
+            (&["learning.hidden=[2048, 2048, 2048]"][..], true),
+            (&["learning.hidden=[8192, 8192]"], false),
+            (&["learning.hidden=[4096]", "refinement.frames=40"], true),
+            (&["learning.hidden=[4096]", "refinement.frames=64"], false),
+        ] {
+            let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
+            let checked = check_policy(&Config::read_with(Path::new("lane"), &settings).unwrap(), N_VALUES, 9);
+            assert_eq!(checked.is_ok(), fits, "{settings:?}");
+            let expected = "MB, and one of at most 67.1 MB is read";
+            assert!(checked.is_ok() || checked.unwrap_err().to_string().contains(expected), "{settings:?}");
         }
     }
 

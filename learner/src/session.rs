@@ -10,6 +10,7 @@ use offtrack_policy::{Activation, Frames, Head, Layer, Normalisation, Policy};
 use super::backend::Backend;
 use super::checkpoint::{Columns, Stored};
 use super::config::{Config, Refinement};
+use super::memory;
 use super::mirror::Mirror;
 use super::network::Mlp;
 use super::ppo::Ppo;
@@ -36,6 +37,7 @@ impl Session {
     /// Trucks at the start of their first episodes on `routes`, an empty replay buffer, and a learner with random
     /// weights. All that can be wrong with a config in this world is an error here.
     pub fn new(backend: &Backend, config: &Config, world: Arc<World>, routes: Vec<u32>) -> Result<Session, Error> {
+        memory::check_policy(config, n_values(&world), world.actions.len())?;
         backend.check_memory(config, n_values(&world), world.actions.len())?;
         let mirror = config.learning.mirror_augmentation.then(|| Mirror::of(&world)).transpose()?;
         Ok(Session {

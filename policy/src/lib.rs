@@ -68,6 +68,6 @@ pub use frames::{Frames, Padding};
 pub use head::{Head, Squash};
 pub use network::{Activation, Layer};
 pub use normalisation::{LIMIT, Normalisation};
-pub use policy::{Choice, Policy, drawn, greedy, sampled};
+pub use policy::{Choice, FILE_LIMIT, Policy, drawn, greedy, sampled};
 pub use recurrent::{Cell, Gates, Recurrent};
 pub use selection::Selection;

@@ -16,8 +16,8 @@ use crate::normalisation::Normalisation;
 use crate::recurrent::Recurrent;
 use crate::selection::{Selection, VEHICLES_AT};
 
-/// Most bytes of a policy file: two hundred times the shipped ones.
-const FILE_LIMIT: u64 = 64 << 20;
+/// Most bytes of a policy file that is read: two hundred times the shipped ones.
+pub const FILE_LIMIT: u64 = 64 << 20;
 
 /// The policies that come with the project, by name. One with a benchmark's name drives there unless another is asked
 /// for.
@@ -213,8 +213,8 @@ impl Policy {
         self.frames.n != 1 || self.recurrent.is_some()
     }
 
-    /// Whether it is a perceptron of all values of one step, with a value an action: what `offtrack train` writes and
-    /// continues with.
+    /// Whether it is a perceptron of all values of one step, with a value an action: what `offtrack train` writes,
+    /// unless it refines by several frames, and continues with.
     pub fn is_plain(&self) -> bool {
         self.acts_on_device() && self.values.is_none()
     }

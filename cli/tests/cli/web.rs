@@ -119,6 +119,11 @@ fn a_folder_that_is_no_run_or_has_no_policies_for_the_benchmark_is_refused_with_
     std::fs::remove_dir_all(place.file("runs/run/policies")).unwrap();
     let left = place.text("runs/run/policy.safetensors");
     refused(&[&["--run", &run], &to[..]].concat(), &["--run", "keeps no policies", &format!("--policy {left}")]);
+    // A page observes one step.
+    crate::resume::refine(&place);
+    succeed(&place.train(&["--name", "framed", "--steps", "4000"]));
+    let framed = place.text("runs/framed");
+    refused(&[&["--run", &framed], &to[..]].concat(), &["--run", "its policy sees 3 observations"]);
 }
 
 #[test]
