@@ -6,9 +6,9 @@ class Pairs {
     Object.assign(this, { page, first, names, frame: 0, playing: false });
     this.figures = [...document.querySelectorAll(".pair figure")];
     byId("replay").hidden = names.length === 0;
-    byId("note").textContent = differing === 0 ? "The same episodes arrive on every side."
-      : names.length < differing ? `${whole(names.length)} of the ${whole(differing)} episodes that arrive on one side alone.`
-      : `${whole(differing)} episodes arrive on one side alone.`;
+    byId("note").textContent = differing === 0 ? "By the first file of each side the same episodes arrive."
+      : names.length < differing ? `${whole(names.length)} of the ${whole(differing)} pairs from one start, by the first file of each side, of which one alone arrives.`
+      : `${whole(differing)} pairs from one start, by the first file of each side, of which one alone arrives.`;
     if (names.length === 0) return;
     byId("pair").replaceChildren(...names.map((name, index) => {
       const [one, other] = this.episodesOf(index);

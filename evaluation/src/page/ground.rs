@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use crate::recording::{self, Class, Measures, Track};
+use offtrack::map::Road;
 use offtrack::map::route::Route;
 use offtrack::scenario::Scenario;
 use offtrack::world::World;
@@ -115,7 +116,7 @@ impl<'a> Ground<'a> {
                 });
             }
             let (route, number) = (routes.len() - 1, track.env % per_route);
-            let (vehicle, class) = fleet.index(page.world, track.vehicle);
+            let (vehicle, class) = fleet.index(page.world, track.vehicle, &page.scenario.places[place].roundabout);
             episodes.push(Episode {
                 route,
                 number,
@@ -154,18 +155,18 @@ impl<'a> Ground<'a> {
 struct Fleet {
     vehicles: Vec<Measures>,
     classes: Vec<Class>,
-    /// Indices of a row of the world's `rigs`, once it was met.
-    met: HashMap<u32, (usize, Option<usize>)>,
+    /// Indices of a row of the world's `rigs`, once it was met, by the hand of the road.
+    met: HashMap<(u32, bool), (usize, Option<usize>)>,
 }
 
 impl Fleet {
-    /// Indices of a row of the world's `rigs` into `vehicles` and `classes`. Trucks that differ in their load alone
-    /// have the same dimensions.
-    fn index(&mut self, world: &World, row: u32) -> (usize, Option<usize>) {
+    /// Indices of a row of the world's `rigs` on a road into `vehicles` and `classes`. Trucks that differ in their load
+    /// alone have the same dimensions.
+    fn index(&mut self, world: &World, row: u32, road: &Road) -> (usize, Option<usize>) {
         let Fleet { vehicles, classes, met } = self;
-        *met.entry(row).or_insert_with(|| {
+        *met.entry((row, road.is_mirrored())).or_insert_with(|| {
             let class = Class::of(world, row).map(|class| position(classes, class));
-            (position(vehicles, Measures::of(world, row)), class)
+            (position(vehicles, Measures::of(world, row).seen(road)), class)
         })
     }
 }

@@ -16,13 +16,13 @@ function lineOfRoute({ ground }, route) {
   return { points, lengths, between, ring: [ground.approach, lengths.at(-1) - ground.departure] };
 }
 
-/** The distance along a route of each frame of an episode, which does not go back [m]. */
+/** The distance along a route of each frame of an episode, which may begin anywhere and does not go back [m]. */
 function stations({ columns }, episode, { points, lengths }) {
   let segment = 0, station = -Infinity;
   return Array.from({ length: episode.n_frames }, (_, frame) => {
     const x = columns.x[episode.first + frame], y = columns.y[episode.first + frame];
     let best = Infinity, found = station, on = segment;
-    for (let index = segment; index + 1 < points.length && lengths[index] <= Math.max(station, 0) + AHEAD; index++) {
+    for (let index = segment; index + 1 < points.length && (frame === 0 || lengths[index] <= Math.max(station, 0) + AHEAD); index++) {
       const [ax, ay] = points[index], length = lengths[index + 1] - lengths[index];
       if (!(0 < length)) continue;
       const [ux, uy] = [(points[index + 1][0] - ax) / length, (points[index + 1][1] - ay) / length];

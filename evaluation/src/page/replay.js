@@ -99,7 +99,9 @@ class Replay {
   /** Opens the episode that the address names; false if it names none. */
   openLink() {
     // The last part of a route's name is no number, those before it may be.
-    const asked = location.hash.match(/^#(.+\/[^/]*[^/\d.][^/]*)\/(\d+)(?:\/(\d+(?:\.\d+)?))?$/);
+    let hash = location.hash;
+    try { hash = decodeURIComponent(hash); } catch { /* It was not written by this page. */ }
+    const asked = hash.match(/^#(.+\/[^/]*[^/\d.][^/]*)\/(\d+)(?:\/(\d+(?:\.\d+)?))?$/);
     const route = asked && this.page.ground.routes.findIndex(({ name }) => name === asked[1]);
     const episode = asked && this.page.episodes.find((episode) => episode.route === route && episode.number === Number(asked[2]));
     if (!episode) return false;
@@ -161,7 +163,7 @@ class Replay {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     const tag = event.target.tagName;
     // Controls with keys of their own keep them.
-    if (tag === "SELECT" || tag === "SUMMARY" || (event.key === " " && tag === "BUTTON") || (event.key.startsWith("Arrow") && tag === "INPUT" && event.target.type === "range")) return;
+    if (tag === "SELECT" || tag === "SUMMARY" || (event.key === " " && (tag === "BUTTON" || event.target.type === "checkbox")) || (event.key.startsWith("Arrow") && tag === "INPUT" && event.target.type === "range")) return;
     const inside = byId("replay").contains(event.target), box = this.canvas.getBoundingClientRect();
     const visible = box.top < window.innerHeight && 0 < box.bottom;
     if (!inside && !(event.target === document.body && visible)) return;

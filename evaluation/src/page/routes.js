@@ -56,9 +56,9 @@ function cells(summary, scales) {
   const ends = figure("ends", endsBar(summary.ends, summary.episodes), failures.count === 0 ? "all arrived" : `${failures.count} failed`, 76);
   ends.title = failures.words || "all arrived";
   // Of many episodes a whole per cent is many, and their numbers are wide.
-  const many = 1000 <= summary.episodes;
+  const many = 200 < summary.episodes, wide = 1000 <= summary.episodes;
   const success = figure("success", fractionBar(summary.success, summary.success_low, summary.success_high, "var(--good)", 16),
-      `${summary.arrived}/${summary.episodes}  ${decimal(100 * summary.success, many ? 1 : 0)}${GAP}%`, many ? 132 : 92);
+      `${summary.arrived}/${summary.episodes}  ${decimal(100 * summary.success, many ? 1 : 0)}${GAP}%`, wide ? 132 : many ? 112 : 92);
   if (summary.success_low_over_routes < summary.success_high_over_routes) success.title = overRoutes(summary).slice(2);
   return [
     success,
