@@ -18,6 +18,13 @@ use crate::{draw, outputs, roads};
 /// Longest name of a coordinate frame (characters).
 const LONGEST_NAME: usize = 200;
 
+/// An error where a map's coordinates are not in the frame that is named: its header has an offset, which is not applied.
+pub fn check_frame(map: &Map, crs: Option<&String>) -> Result<(), Error> {
+    let (Some(name), Some(_)) = (crs, map.header_offset()) else { return Ok(()) };
+    let expected = "the map's header has an offset, which is not applied: its coordinates are in no such frame";
+    Err(Error::Setting { name: "--crs", value: name.clone(), expected: expected.to_owned() })
+}
+
 /// Write a road for other programs: as an OpenDRIVE map, or its kerbs and lanes as GeoJSON.
 ///
 /// In a map the junction has a connecting road for each route, arms have a road for each lane, and kerbs and the ring's
@@ -74,10 +81,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     outputs::distinct(&[("--output", Some(&args.output))], &[("ROAD", Some(file))])?;
     let road = if is_map(file) {
         let map = Map::read(file, args.place.hand)?;
-        if let (Some(name), Some(_)) = (&args.crs, map.header_offset()) {
-            let expected = "the map's header has an offset, which is not applied: its coordinates are in no such frame";
-            return refused("--crs", name.clone(), expected);
-        }
+        check_frame(&map, args.crs.as_ref())?;
         Road::in_map(file, &map, &args.place.choice())?
     } else {
         roads::road(&args.road, &args.place)?

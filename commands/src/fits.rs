@@ -8,6 +8,8 @@ use std::time::{Duration, Instant, SystemTime};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use offtrack::files::reader::shown as number;
 use offtrack::files::shipped::{Kind, Source};
+use offtrack::map::chosen::is_map;
+use offtrack::map::opendrive::Map;
 use offtrack::map::{Gutter, Road};
 use offtrack::vehicle::Vehicle;
 use offtrack_drawing::fits::sheet::{self, Head, Shown};
@@ -91,8 +93,12 @@ impl Args {
 pub fn run(args: &Args) -> Result<bool, Error> {
     let asked = asked(args)?;
     let roads: Vec<Road> = args.roads.iter().map(|name| roads::road(name, &args.place)).collect::<Result<_, _>>()?;
-    if !args.roads.iter().any(|name| offtrack::map::chosen::is_map(Path::new(name))) {
+    let maps: Vec<&Path> = args.roads.iter().map(Path::new).filter(|file| is_map(file)).collect();
+    if maps.is_empty() {
         args.place.check_absent()?;
+    }
+    for file in maps.into_iter().filter(|_| args.crs.is_some()) {
+        export::check_frame(&Map::read(file, args.place.hand)?, args.crs.as_ref())?;
     }
     let vehicles: Vec<(String, Vehicle)> =
         args.vehicle_names().map(|name| vehicle(name, &args.load)).collect::<Result<_, _>>()?;
@@ -124,11 +130,12 @@ pub fn run(args: &Args) -> Result<bool, Error> {
     let units = args.units();
     let fit = shown.iter().filter(|row| row.fits).count();
     files::print(&format!(
-        "{}{fit} of {} fit: {}, {} km/h, {} {} from every kerb\n",
+        "{}{fit} of {} fit: {}, {} {}, {} {} from every kerb\n",
         table(&shown, terminal::width(), units),
         shown.len(),
         asked.load,
-        number(asked.speed_kmh),
+        units.exact_speed(asked.speed_kmh),
+        units.of_speed(),
         units.length(asked.clearance),
         units.of_length()
     ))?;
@@ -149,6 +156,10 @@ impl Work<'_> {
     /// Answers what is not answered yet of a road and writes its sheets; gives route and vehicle of every row asked
     /// for, in order.
     fn road(&self, road: &Road, results: &mut Results) -> Result<Vec<(String, String)>, Error> {
+        // Sheets of all its routes, from a call before, stay.
+        if wanted_rows(std::slice::from_ref(road), &self.args.route) == 0 {
+            return Ok(Vec::new());
+        }
         let mut cases = Vec::new();
         for (name, vehicle) in self.vehicles {
             let scenario = Case::scenario(self.asked, road, vehicle)?;

@@ -158,7 +158,7 @@ fn sheets(
     let of = if shown.len() < roads.len() {
         format!("The first {} of {} random roads", shown.len(), roads.len())
     } else {
-        format!("{} random roads", shown.len())
+        format!("{} random road{}", shown.len(), if shown.len() == 1 { "" } else { "s" })
     };
     let title = format!("{of}: distribution {}, seed {}", distribution.name, args.seed);
     let svg = sheet::drawn(&title, &shown)

@@ -96,6 +96,7 @@ impl Chart {
         let lettering = Lettering::new()?;
         let n_panels = self.panels.len().max(1) as f64;
         let width = CORNER.x + n_panels * PLOT.x + (n_panels - 1.0) * GAP + MARGIN;
+        let letters = lettering.fitting(&self.title, 23.0, width - 48.0);
         let mut group = Group::new();
         let mut lowest = 0.0f64;
         for (index, panel) in self.panels.iter().enumerate() {
@@ -113,7 +114,7 @@ impl Chart {
             .set("height", height)
             .add(Title::new(self.title.as_str()))
             .add(paper)
-            .add(lettering.text(&self.title, DVec2::new(24.0, 32.0), 23.0, Align::Left, colour::INK));
+            .add(lettering.text(&self.title, DVec2::new(24.0, 32.0), letters, Align::Left, colour::INK));
         for (index, words) in self.subtitles.iter().enumerate() {
             let at = DVec2::new(24.0, 56.0 + 19.0 * index as f64);
             document = document.add(lettering.text(words, at, 14.5, Align::Left, colour::FAINT));

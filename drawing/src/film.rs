@@ -11,8 +11,8 @@ use crate::{COLOUR_STEP, Error, painted, stepped};
 
 /// Simulated time between two pictures (s).
 const DRIVEN: f64 = 0.2;
-/// Time that a picture is shown, half of that: the film runs at twice the speed [hundredths of a second].
-const SHOWN: u16 = 10;
+/// How many times as fast as the episode the film runs.
+const FASTER: f64 = 2.0;
 /// Time that the last picture is shown [hundredths of a second].
 const LAST_SHOWN: u16 = 250;
 /// Quantised values of a colour channel: 0, 15, ... 255.
@@ -23,9 +23,20 @@ const UNCHANGED: u8 = 255;
 /// Indices of the frames of a recording that a film shows: the first, the last, and those between at even distances.
 /// `step` is the time between two frames (s).
 pub fn frames(n_frames: usize, step: f64) -> Vec<usize> {
-    let stride = (DRIVEN / step).round().max(1.0) as usize;
+    let stride = stride(step);
     let last = n_frames - 1;
     (0..last).step_by(stride).chain([last]).collect()
+}
+
+/// Frames from one picture to the next.
+fn stride(step: f64) -> usize {
+    (DRIVEN / step).round().max(1.0) as usize
+}
+
+/// Time that the picture of this number is shown, before another one [hundredths of a second].
+fn delay(number: usize, step: f64) -> u16 {
+    let at = |number: usize| (100.0 * (number * stride(step)) as f64 * step / FASTER).round();
+    (at(number + 1) - at(number)) as u16
 }
 
 /// An episode of a film.
@@ -75,12 +86,12 @@ pub fn gif(takes: &[Take], width: u32, mut drawn: impl FnMut()) -> Result<Vec<u8
     encoder.set_repeat(Repeat::Infinite)?;
     let white = palette.nearest[palette.nearest.len() - 1];
     let mut before = Vec::new();
-    for (take, Take { frames, .. }) in takes.iter().enumerate() {
+    for (take, Take { scene, frames }) in takes.iter().enumerate() {
         for (n, &index) in frames.iter().enumerate() {
             let mut indices = palette.indices(&picture(take, index)?);
             indices.resize((width * height) as usize, white);
             let mut frame = changed(&before, &indices, wide.into());
-            frame.delay = if n + 1 == frames.len() { LAST_SHOWN } else { SHOWN };
+            frame.delay = if n + 1 == frames.len() { LAST_SHOWN } else { delay(n, scene.recording.step) };
             encoder.write_frame(&frame)?;
             before = indices;
             drawn();
@@ -170,6 +181,16 @@ mod tests {
         assert_eq!(frames(5, 0.1), [0, 2, 4]);
         assert_eq!(frames(3, 0.5), [0, 1, 2]);
         assert_eq!(frames(1, 0.1), [0]);
+    }
+
+    #[test]
+    fn a_film_runs_at_twice_the_speed_whatever_the_step_is() {
+        assert!((0..100).all(|number| delay(number, 0.1) == 10));
+        for step in [0.01, 0.03, 0.12, 0.15, 0.5, 1.0] {
+            let shown: u32 = (0..100).map(|number| u32::from(delay(number, step))).sum();
+            let driven = 100.0 * (100 * stride(step)) as f64 * step;
+            assert!((2.0 * f64::from(shown) - driven).abs() <= 1.0, "{step}: {shown}");
+        }
     }
 
     #[test]

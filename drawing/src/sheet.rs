@@ -23,6 +23,8 @@ const MARGIN: f64 = 20.0;
 const TITLE: f64 = 52.0;
 /// Length of the arms shown beyond the largest ring (m).
 const ARMS: f64 = 16.0;
+/// Least width of a sheet, for its title (px).
+const NARROWEST: f64 = 480.0;
 /// Maps in a row at most.
 const COLUMNS: usize = 8;
 
@@ -37,6 +39,8 @@ pub fn drawn(title: &str, roundabouts: &[&Road]) -> Result<String, Error> {
     let rows = roundabouts.len().div_ceil(columns).max(1);
     let cell = DVec2::new(MAP + GAP, MAP + GAP + CAPTION);
     let size = DVec2::new(columns as f64, rows as f64) * cell - GAP + 2.0 * MARGIN + DVec2::new(0.0, TITLE);
+    let size = size.max(DVec2::new(NARROWEST, 0.0));
+    let letters = lettering.fitting(title, 24.0, size.x - 2.0 * MARGIN);
     let reach = roundabouts.iter().map(|roundabout| roundabout.outer_radius()).fold(0.0, f64::max) + ARMS;
     let straights = Straights { approach: reach, departure: reach };
     let mut definitions = Definitions::new();
@@ -74,7 +78,7 @@ pub fn drawn(title: &str, roundabouts: &[&Road]) -> Result<String, Error> {
         .add(Title::new(title))
         .add(definitions)
         .add(Rectangle::new().set("width", size.x + 1.0).set("height", size.y + 1.0).set("fill", "white"))
-        .add(lettering.text(title, DVec2::new(MARGIN, MARGIN + 24.0), 24.0, Align::Left, colour::INK))
+        .add(lettering.text(title, DVec2::new(MARGIN, MARGIN + 24.0), letters, Align::Left, colour::INK))
         .add(maps);
     Ok(format!("{document}\n"))
 }

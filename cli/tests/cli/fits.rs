@@ -176,11 +176,33 @@ fn the_table_is_no_wider_than_the_terminal_and_has_feet_on_request() {
         assert!(table.iter().all(|line| line.chars().count() <= columns.parse().unwrap()), "{said}");
     }
     let said = String::from_utf8(fits(&place, &[&EASY[..], &["--feet"]].concat()).stdout).unwrap();
-    assert!(said.contains(" ft") && said.contains("mph"), "{said}");
+    assert!(said.contains(" ft") && said.contains("mph") && !said.contains("km/h"), "{said}");
     let (json, svg) = (place.json("fits/fits.json"), text(&place, "16m.svg"));
     let width = json["rows"][0]["lane_centre"]["swept_width"].as_f64().unwrap();
     assert!(svg.contains(&format!("swept {:.1} ft", width / 0.3048)) && svg.contains("30 ft"), "{width}");
     assert!(!svg.contains(" m long") && svg.contains(" ft long"));
+}
+
+#[test]
+fn a_road_without_a_route_that_is_asked_for_has_no_files() {
+    let place = Place::new();
+    succeed(&fits(&place, &["20m", "--vehicle", "eu_4x2_13m6", "--route", "16m/E-right-2"]));
+    assert!(place.file("fits/16m.svg").exists() && !place.file("fits/20m.svg").exists());
+}
+
+#[test]
+fn coordinates_that_are_in_no_frame_are_said_to_be_in_none() {
+    let place = Place::new();
+    let map = std::fs::read_to_string(repository().join("tests/data/maps/plain_ring.xodr")).unwrap();
+    let offset = "<offset x=\"1000\" y=\"2000\" z=\"0\" hdg=\"0.5\"/></header>";
+    std::fs::write(place.file("moved.xodr"), map.replace("</header>", offset)).unwrap();
+    let (map, folder, file) = (place.text("moved.xodr"), place.text("fits"), place.text("moved.geojson"));
+    let frame = ["--crs", "urn:ogc:def:crs:EPSG::25832"];
+    for command in [&["fits", &map, "--vehicle", "daf_xf", "-o", &folder][..], &["export", &map, "-o", &file]] {
+        let said = refusal(&offtrack(&[command, &frame].concat()), 2);
+        assert!(said.contains("--crs: urn:ogc:def:crs:EPSG::25832; the map's header has an offset"), "{said}");
+    }
+    assert!(!place.file("fits").exists() && !place.file("moved.geojson").exists());
 }
 
 #[test]

@@ -20,6 +20,8 @@ use crate::view::{Layout, Straights, View, colour, number};
 
 /// Length of the arms shown beyond the ring (m).
 const ARMS: f64 = 25.0;
+/// Length shown beyond the place where a truck comes nearest to a kerb (m).
+const BEYOND: f64 = 5.0;
 /// Sizes of letters, and line spacing as a multiple of them (px).
 const TITLE: f64 = 20.0;
 const HEADING: f64 = 12.5;
@@ -52,7 +54,12 @@ pub struct Head<'a> {
 pub fn drawn(road: &Road, shown: &[Shown], head: &Head) -> Result<String, Error> {
     let lettering = Lettering::new()?;
     let letters = Letters::of(&lettering);
-    let reach = (road.outer_radius() + ARMS).ceil();
+    // Every panel has the place that decides its answer.
+    let nearest = |one: &Shown| {
+        let (_, at) = one.row.shown().nearest();
+        (DVec2::new(at.x, at.y) - road.ground().origin).abs().max_element() + BEYOND
+    };
+    let reach = shown.iter().map(nearest).fold(road.outer_radius() + ARMS, f64::max).ceil();
     let paper = Paper::holding(shown.len(), 2.0 * reach);
     let layout = Layout { corner: DVec2::ZERO, width: paper.side * PX, margin: 0.0, ratio: 1.0 };
     let view = View::laid_out([DVec2::splat(-reach), DVec2::splat(reach)].into_iter(), &layout);

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::fmt::Write;
 
-use offtrack::files::reader::shortened;
+use offtrack::files::reader::{shortened, shown};
 
 use super::row::Row;
 use super::way::Way;
@@ -50,7 +50,16 @@ impl Units {
         }
     }
 
-    pub(super) fn of_speed(self) -> &'static str {
+    /// A speed as it was asked for, to a tenth of a mile an hour (km/h).
+    pub fn exact_speed(self, kmh: f64) -> String {
+        match self {
+            Units::Metric => shown(kmh),
+            Units::Feet => shown((kmh / MILE * 10.0).round() / 10.0),
+        }
+    }
+
+    /// The unit of speeds.
+    pub fn of_speed(self) -> &'static str {
         match self {
             Units::Metric => "km/h",
             Units::Feet => "mph",

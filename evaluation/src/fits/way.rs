@@ -103,7 +103,7 @@ impl Way {
         let [tractor, trailer] = path.clearances(kerbs);
         let origin = road.ground().origin;
         let nearest = |unit: &UnitClearance| {
-            // Between two points of an outline a kerb's corner may be nearer.
+            // A kerb's corner between two points of an outline may touch it.
             let least = if unit.overlaps.is_empty() { unit.least } else { unit.least.min(0.0) };
             let at = origin + unit.at;
             Nearest { clearance: to(ROUNDED, least), x: to(ROUNDED, at.x), y: to(ROUNDED, at.y) }

@@ -7,6 +7,8 @@ use crate::geometry::area::{Area, points};
 
 /// Distance between the points of an outline at which clearance is computed (m).
 const BETWEEN_POINTS: f64 = 0.05;
+/// How deep an overlap that no point of the outline shows is at least: it is looked for so far inside (m).
+const HIDDEN: f64 = 0.002;
 /// Largest distance of a swept area's corner that is left out from the edge without it (m).
 const SIMPLIFIED: f64 = 0.005;
 
@@ -27,12 +29,15 @@ impl UnitClearance {
         let mut found = UnitClearance { least: f64::INFINITY, at: DVec2::ZERO, overlaps: Vec::new() };
         let mut overlapping = false;
         for corners in path {
-            let (deepest, distance) = nearest(corners, kerbs);
+            let (deepest, mut distance) = nearest(corners, kerbs);
+            // A narrow nose may lie between two points of the outline: the overlap is decided exactly.
+            let overlaps = kerbs.intersects_rectangle(corners);
+            if overlaps && -HIDDEN < distance && kerbs.intersects_rectangle(&within(corners, HIDDEN)) {
+                distance = -HIDDEN;
+            }
             if distance < found.least {
                 (found.least, found.at) = (distance, deepest);
             }
-            // A narrow nose may lie between two points of the outline: the overlap is decided exactly.
-            let overlaps = kerbs.intersects_rectangle(corners);
             if overlaps {
                 let depth = -distance.min(0.0);
                 match found.overlaps.last_mut().filter(|_| overlapping) {
@@ -45,6 +50,15 @@ impl UnitClearance {
         }
         found
     }
+}
+
+/// A rectangle with each side moved inwards (m).
+fn within(corners: &[DVec2; 4], by: f64) -> [DVec2; 4] {
+    std::array::from_fn(|index| {
+        let corner = corners[index];
+        let along = |other: usize| (corners[other % 4] - corner).normalize_or_zero() * by;
+        corner + along(index + 1) + along(index + 3)
+    })
 }
 
 /// The point of a rectangle's outline with the least signed distance from the kerbs, and that distance (m).
@@ -101,7 +115,7 @@ pub fn hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Curve;
+    use crate::geometry::{Curve, Piece};
 
     #[test]
     fn a_hull_of_two_squares_has_their_outer_corners_counter_clockwise() {
@@ -127,6 +141,24 @@ mod tests {
         let depths: Vec<f64> = found.overlaps.iter().map(|(_, depth)| (depth * 1e6).round() / 1e6).collect();
         assert_eq!(depths, [0.2, 0.3]);
         assert!((found.least + 0.3).abs() < 1e-9 && found.at.distance(DVec2::new(0.0, -1.3)) < 1e-9, "{found:?}");
+    }
+
+    #[test]
+    fn a_nose_between_two_points_of_a_side_and_a_post_within_are_overlaps_of_some_depth() {
+        let body = [(6.0, 1.2), (-6.0, 1.2), (-6.0, -1.2), (6.0, -1.2)].map(|(x, y)| DVec2::new(x, y));
+        let around = |kerb: Curve| Outline::new(vec![Curve::circle(DVec2::ZERO, 50.0), kerb]);
+        let triangle = |tip: f64| {
+            // Half way between points of the side that are 5 cm apart.
+            let corners = [(0.025, tip), (0.005, -3.0), (0.045, -3.0)].map(|(x, y)| DVec2::new(x, y));
+            let pieces = (0..3).map(|index| Piece::Segment { from: corners[index], to: corners[(index + 2) % 3] });
+            around(Curve { pieces: pieces.collect() })
+        };
+        let least = |kerb: &Outline| UnitClearance::of(&[body], kerb).least;
+        assert!(0.0 < nearest(&body, &triangle(-1.16)).1, "no point lies in it");
+        assert_eq!(least(&triangle(-1.16)), -HIDDEN);
+        assert_eq!(least(&around(Curve::circle(DVec2::ZERO, 0.1))), -HIDDEN);
+        // One that just touches has no depth.
+        assert!(0.0 < least(&triangle(-1.1995)));
     }
 
     #[test]
