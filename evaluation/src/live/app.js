@@ -52,6 +52,10 @@ class App {
     byId("missing").hidden = true;
     this.say("Compiling the shaders of the simulator for this device.");
     clearTimeout(this.silence);
+    // A device that failed goes, with all its memory.
+    const failed = this.gpu;
+    this.run = this.gpu = null;
+    failed?.destroy();
     try {
       const gpu = (this.gpu = await openDevice(this.live));
       const stop = (kind) => (message) => this.gpu === gpu && this.sayMissing(kind, message);
@@ -63,6 +67,7 @@ class App {
       this.stage = new Stage(this.gpu, this.picture);
       if (isSoftware(this.gpu)) this.chosen.n = Math.min(this.chosen.n, FEW);
       await this.choose(options);
+      if (!byId("missing").hidden) return;
       byId("said").hidden = true;
       this.isReady(this);
       this.loop();
@@ -169,6 +174,7 @@ class App {
     this.stage.show(made);
     this.stage.fit();
     this.name();
+    this.showFigures();
   }
 
   /** Forgets the last world, on which trucks do not drive. */
@@ -191,6 +197,7 @@ class App {
     this.stage.show(crowds);
     visit.open(visit.focus);
     this.name();
+    this.showFigures();
     showChoices(this);
   }
 
@@ -276,10 +283,13 @@ class App {
   }
 
   async count() {
-    const { crowds } = this;
-    for (const crowd of crowds) await crowd.count();
-    showResults(this.live, crowds, this.split);
-    this.failures.show(crowds);
+    for (const crowd of this.crowds) await crowd.count();
+    this.showFigures();
+  }
+
+  showFigures() {
+    showResults(this.live, this.crowds, this.split);
+    this.failures.show(this.crowds);
   }
 
   get scene() {
@@ -301,6 +311,8 @@ class App {
   play(playing) {
     this.playing = playing;
     showPlaying(byId("play"), playing);
+    if (!playing) this.crowds.forEach((crowd) => (crowd.moments = []));
+    if (0 < this.crowds.length) this.showFigures();
   }
 
   setRate(rate) {

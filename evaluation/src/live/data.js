@@ -69,6 +69,8 @@ class Live {
     let read;
     try {
       read = { ...JSON.parse(facts), kinds: await unpacked(lines) };
+      const isWhole = ({ kind, at, size }) => at + size <= read.kinds[kind]?.length;
+      if (!read.sections.every(isWhole)) throw new Error("a part is missing");
     } catch {
       throw new Error(`${name} is a damaged world file; download it or write it again.`);
     }

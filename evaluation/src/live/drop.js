@@ -46,7 +46,15 @@ function policyOf(live, name, bytes) {
 /** Listens to drags over the page and to the file dialogue. */
 function listenToFiles(app) {
   const hint = byId("drop-here");
-  const taken = async (file) => app.dropFile(file.name, new Uint8Array(await file.arrayBuffer()));
+  const taken = async (file) => {
+    let bytes;
+    try {
+      bytes = new Uint8Array(await file.arrayBuffer());
+    } catch {
+      return app.say(`${file.name} cannot be read.`, true);
+    }
+    return app.dropFile(file.name, bytes);
+  };
   let depth = 0;
   const show = (more) => {
     depth = Math.max(depth + more, 0);

@@ -72,7 +72,8 @@ class FailureList {
   }
 
   show(crowds) {
-    const all = crowds.flatMap((crowd) => crowd.failures.map((failure) => ({ crowd, failure }))).slice(0, MOST_LISTED);
+    const most = Math.ceil(MOST_LISTED / crowds.length);
+    const all = crowds.flatMap((crowd) => crowd.failures.slice(0, most).map((failure) => ({ crowd, failure })));
     const count = crowds.reduce((sum, { tally }) => sum + failuresOf(tally), 0);
     byId("failures-count").textContent = count === 0 ? "none yet" : whole(count);
     const who = crowds.map(({ taken }) => taken).join("/");

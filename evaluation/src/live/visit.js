@@ -60,6 +60,8 @@ class Visit {
       this.giveBack();
       return;
     }
+    // What happens again is not steered.
+    if (this.again !== null) return;
     if (this.focus === null) await this.pickNext(1);
     if (this.focus !== null) this.takeOver();
   }
@@ -115,7 +117,8 @@ class Visit {
   }
 
   async latestFailure() {
-    const crowd = this.app.crowds.find(({ failures }) => 0 < failures.length);
+    const seen = this.focus?.from ?? this.focus;
+    const crowd = [seen, ...this.app.crowds].find((one) => one !== null && 0 < one.failures.length);
     if (crowd) await this.driveAgain(crowd, crowd.failures[0]);
     else this.app.say("No episode has failed yet.");
   }
