@@ -174,8 +174,8 @@ mod tests {
             ),
             (
                 "lane",
-                &["refinement.frames=64", "refinement.n_steps=8", "learning.hidden=[8192]", "n_envs=64"],
-                "learning.hidden: [8192];",
+                &["refinement.frames=64", "refinement.n_steps=8", "learning.hidden=[8192, 1024]", "n_envs=64"],
+                "learning.hidden: [8192, 1024];",
             ),
             // One frame would fit.
             (
