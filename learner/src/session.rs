@@ -37,8 +37,8 @@ impl Session {
     /// Trucks at the start of their first episodes on `routes`, an empty replay buffer, and a learner with random
     /// weights. All that can be wrong with a config in this world is an error here.
     pub fn new(backend: &Backend, config: &Config, world: Arc<World>, routes: Vec<u32>) -> Result<Session, Error> {
-        memory::check_policy(config, n_values(&world), world.actions.len())?;
         backend.check_memory(config, n_values(&world), world.actions.len())?;
+        memory::check_policy(config, n_values(&world), world.actions.len())?;
         let mirror = config.learning.mirror_augmentation.then(|| Mirror::of(&world)).transpose()?;
         Ok(Session {
             rollout: backend.rollout(config, &world, routes, mirror.clone())?,
