@@ -28,8 +28,9 @@ class Crowd {
     await this.batch.setPolicy(policy).catch((error) => {
       throw new Error(`${policy.name} ${error.message}.`);
     });
-    // Episodes that the visitor drove, at least in part: "truck/episode".
-    Object.assign(this, { policy, driven: new Set(), tally: null, failures: [], moments: [] });
+    // Episodes that the visitor drove, at least in part, and what those begin with that he gave another load:
+    // "truck/episode".
+    Object.assign(this, { policy, driven: new Set(), loaded: new Map(), tally: null, failures: [], moments: [] });
     this.taken = Crowd.taken += 1;
   }
 

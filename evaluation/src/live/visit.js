@@ -105,7 +105,7 @@ class Visit {
     const { picture, gpu, world, sites } = app;
     const again = await Crowd.open({ picture, gpu, world, sites, options, policy: crowd.policy });
     Object.assign(again, { from: crowd, failure });
-    again.batch.begin([{ env: 0, seed, of: env, episode }]);
+    again.batch.begin([{ env: 0, seed, of: env, episode, ...crowd.loaded.get(`${env}/${episode}`) }]);
     // It has set out: its first episode is not to begin in the next step.
     again.batch.begun = 1;
     await again.follow(0);
@@ -164,6 +164,7 @@ class Visit {
     const start = { offset: 0, heading: 0, speed: 0, vehicle };
     const { episode, route } = row.truck;
     focus.batch.begin([{ env: followed, episode, route, start }]);
+    focus.loaded.set(`${followed}/${episode}`, { route, start });
     focus.forgetSteps();
     focus.row = await focus.batch.row(followed);
     focus.add(focus.row);

@@ -337,8 +337,16 @@ async function counts(live) {
 /** A failure of random actions, driven again. */
 async function again(live) {
   const page = await opened(live, { n: 8, policy: -1 }), [crowd] = page.crowds;
-  // One of a later episode than a truck's first.
-  const isLater = ({ episode }) => 0 < episode;
+  // One of a later episode than a truck's first; where there are loads, of one that the visitor chose.
+  let isLater = ({ episode }) => 0 < episode;
+  if (1 < page.world.facts.classes.length) {
+    await page.stepBy(4);
+    await page.pickTruck(1);
+    const { own, at } = page.visit.loads(), { episode } = crowd.row.truck;
+    await page.between(() => page.visit.setLoad((at + 1) % own.length));
+    await page.between(() => page.visit.leave());
+    isLater = (failure) => failure.env === 1 && failure.episode === episode;
+  }
   while (!crowd.failures.some(isLater)) await page.stepBy(10);
   const failure = crowd.failures.find(isLater);
   await page.between(() => page.visit.driveAgain(crowd, failure));

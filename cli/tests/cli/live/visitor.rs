@@ -203,6 +203,13 @@ fn a_failure_that_is_driven_again_ends_as_it_did() {
     assert!(0 < failure["episode"].as_u64().unwrap(), "{found}");
     assert_eq!((&found["steps"], &found["position"]), (&failure["steps"], &failure["position"]), "{found}");
     assert!(found["state"].as_str().unwrap().ends_with("as before"), "{found}");
+    // With another load than was drawn, from the start that it had then.
+    let (ground, policy) = (ground("laden2026"), shipped("laden2026"));
+    let laden = written(vec![ground], vec![policy], &place.file("laden.html"));
+    let found = visited(&laden, &json!({ "visit": "again" }), HashMap::new(), false);
+    let failure = &found["failure"];
+    assert_eq!((&found["steps"], &found["position"]), (&failure["steps"], &failure["position"]), "{found}");
+    assert!(found["state"].as_str().unwrap().ends_with("as before"), "{found}");
 }
 
 #[test]
