@@ -18,7 +18,8 @@ use crate::{draw, outputs, roads};
 /// Longest name of a coordinate frame (characters).
 const LONGEST_NAME: usize = 200;
 
-/// An error where a map's coordinates are not in the frame that is named: its header has an offset, which is not applied.
+/// An error where a map's coordinates are not in the frame that is named: its header has an offset, which is not
+/// applied.
 pub fn check_frame(map: &Map, crs: Option<&String>) -> Result<(), Error> {
     let (Some(name), Some(_)) = (crs, map.header_offset()) else { return Ok(()) };
     let expected = "the map's header has an offset, which is not applied: its coordinates are in no such frame";

@@ -1,5 +1,5 @@
-//! The memory that a run on the processor takes, and its policy's file, reckoned before it begins. Linux grants memory that it does not have
-//! and ends the process that uses it, and an allocation that is refused ends the process too.
+//! The memory that a run on the processor takes, and its policy's file, reckoned before it begins. Linux grants memory
+//! that it does not have and ends the process that uses it, and an allocation that is refused ends the process too.
 
 use offtrack::simulator::available_memory;
 use offtrack_policy::FILE_LIMIT;

@@ -185,10 +185,10 @@ impl Side {
     /// A figure of the episodes of these routes that are counted: by file, and by index of the start. Routes without
     /// such an episode are left out: nothing is drawn from them.
     pub(super) fn cells(&self, figure: Figure, routes: &[usize], counts: impl Fn(usize, usize) -> bool) -> Cells {
+        // All files have the same starts.
+        let episodes = self.outcomes(0).episodes;
         let is_counted = |&&route: &&usize| {
-            let mut starts = (0..self.files.len())
-                .flat_map(|file| (0..self.outcomes(file).episodes).map(move |episode| (file, episode)));
-            starts.any(|(file, episode)| counts(file, route * self.outcomes(file).episodes + episode))
+            (0..self.files.len()).any(|file| (0..episodes).any(|episode| counts(file, route * episodes + episode)))
         };
         let routes: Vec<usize> = routes.iter().filter(is_counted).copied().collect();
         let mut cells = Cells::new(self.files.len(), routes.len());
