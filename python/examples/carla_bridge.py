@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -104,6 +105,7 @@ class Truck:
         ahead = sorted(place.distance_ahead(x, y) for x, y in at)
         self.drive_axle = 0.5 * (ahead[0] + ahead[1])
         """Drive axle ahead of the actor's origin, negative where it is behind [m]."""
+        self._roll: float = trailer.get_transform().rotation.roll
 
     def pose(self) -> dict[str, Any]:
         """What ``Observer.begin`` takes, of one truck."""
@@ -127,12 +129,15 @@ class Truck:
         trailer = self._trailer.get_transform()
         velocity, yaw_rate = self._trailer.get_velocity(), -math.radians(self._trailer.get_angular_velocity().z)
         speed = speed_along(velocity.x, velocity.y, trailer.rotation.yaw)
+        # By its change, so that both have one sign.
+        roll_rate, self._roll = (trailer.rotation.roll - self._roll) / PERIOD, trailer.rotation.roll
         return {
             "steering": np.array([steer_from_wheels(left, right)]),
             "acceleration": np.array([speed_along(acceleration.x, acceleration.y, transform.rotation.yaw)]),
             "lateral_acceleration": np.array([speed * yaw_rate]),
             # Clockwise seen from behind in CARLA, which is to the right.
             "trailer_roll": np.array([math.radians(trailer.rotation.roll)]),
+            "trailer_roll_rate": np.array([math.radians(roll_rate)]),
         }
 
     def command(self, steering: float, speed: float) -> None:
@@ -152,15 +157,17 @@ def synchronous(world: Any) -> None:
     world.apply_settings(settings)
 
 
-def spawn(carla: Any, world: Any, args: argparse.Namespace, axle: Place) -> tuple[Any, Any]:
-    """A tractor whose drive axle is about there, and a trailer in line behind it."""
+def spawn(carla: Any, world: Any, args: argparse.Namespace, axle: Place) -> Iterator[Any]:
+    """A tractor whose drive axle is about there, and a trailer in line behind it: one after the other, so that the
+    caller has the first where there is no room for the second."""
     library = world.get_blueprint_library()
 
     def made(blueprint: str, place: Place) -> Any:
         location = carla.Location(x=place.x, y=place.y, z=args.height)
         return world.spawn_actor(library.find(blueprint), carla.Transform(location, carla.Rotation(yaw=place.yaw)))
 
-    return made(args.truck, axle.ahead(args.tractor_ahead)), made(args.trailer, axle.ahead(args.trailer_ahead))
+    yield made(args.truck, axle.ahead(args.tractor_ahead))
+    yield made(args.trailer, axle.ahead(args.trailer_ahead))
 
 
 def drive(args: argparse.Namespace) -> str:
@@ -180,7 +187,8 @@ def drive(args: argparse.Namespace) -> str:
     try:
         synchronous(world)
         x, y, heading = observer.waypoints(args.route)[0]
-        actors += spawn(carla, world, args, start(np.array([x, y]), heading, args.wheelbase))
+        for actor in spawn(carla, world, args, start(np.array([x, y]), heading, args.wheelbase)):
+            actors.append(actor)
         for _ in range(20):
             world.tick()  # The truck settles in its springs, and hitches.
         truck = Truck(carla, world, *actors)

@@ -20,7 +20,7 @@ import numpy as np
 from minari.data_collector import EpisodeBuffer
 
 import offtrack_sim
-from offtrack_sim.single import observation_space
+from offtrack_sim.single import action_space, observation_space
 
 
 def driven(policy: offtrack_sim.Policy, batch: offtrack_sim.Batch, n_episodes: int) -> list[EpisodeBuffer]:
@@ -80,7 +80,7 @@ def main() -> None:
         episodes,
         env=spec,
         eval_env=evaluated,
-        action_space=gymnasium.spaces.Discrete(len(batch.action_table)),
+        action_space=action_space(batch),
         observation_space=observation_space(len(batch.extras), vehicles=batch.observes_vehicles),
         algorithm_name=f"offtrack policy {policy.name}",
         author="The offtrack authors",

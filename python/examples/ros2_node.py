@@ -12,6 +12,7 @@ Types are checked against tests/ros, which has what this file uses of ROS, and a
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 import rclpy
@@ -27,10 +28,36 @@ import offtrack_sim
 PERIOD = 0.1
 """Time between two actions, the simulator's step [s]."""
 STALE = 0.2
-"""Age of a pose at which the truck brakes [s]: an old pose is a delay, see docs/transfer.md."""
+"""Age of a pose or a message at which the truck brakes [s]: an old one is a delay, see docs/transfer.md."""
 BRAKING = 2.5
 """Deceleration asked for where the truck must stop [m/s^2]."""
 PARAMETERS = {"benchmark": "laden2026", "policy": "laden2026", "route": "", "vehicle": "daf_xf", "load": "laden"}
+
+
+@dataclass(frozen=True)
+class Trailer:
+    """How the trailer stands and turns, by its transforms."""
+
+    stamp: Time
+    heading: float
+    """In the map [rad]."""
+    roll: float
+    """To the right [rad]."""
+    yaw_rate: float = 0.0
+    roll_rate: float = 0.0
+
+    @staticmethod
+    def of(found: TransformStamped, before: Trailer | None) -> Trailer:
+        """By a transform, and the rates [rad/s] since an earlier one."""
+        turned = found.transform.rotation
+        now = Trailer(Time.from_msg(found.header.stamp), yaw(turned), roll(turned))
+        if before is None:
+            return now
+        seconds = (now.stamp - before.stamp).nanoseconds * 1e-9
+        if seconds <= 0.0:
+            return before
+        rates = (math.remainder(now.heading - before.heading, math.tau), now.roll - before.roll)
+        return replace(now, yaw_rate=rates[0] / seconds, roll_rate=rates[1] / seconds)
 
 
 class Driver(Node):
@@ -46,6 +73,9 @@ class Driver(Node):
         self.policy.check(self.observer)
         self.begun = False
         self.steering = self.speed = self.speed_before = 0.0
+        self.heard: dict[str, Time] = {}
+        """When a message of each topic came last."""
+        self.trailer: Trailer | None = None
         self.target = np.zeros(1, dtype=np.float32)
         self.transforms = tf2_ros.Buffer()
         self.listener = tf2_ros.TransformListener(self.transforms, self)
@@ -56,11 +86,11 @@ class Driver(Node):
 
     def hear_odometry(self, message: Odometry) -> None:
         """Speed along the heading of ``base_link``."""
-        self.speed = message.twist.twist.linear.x
+        self.speed, self.heard["odom"] = message.twist.twist.linear.x, self.get_clock().now()
 
     def hear_steering(self, message: AckermannDriveStamped) -> None:
         """Steer angle of the front axle."""
-        self.steering = message.drive.steering_angle
+        self.steering, self.heard["steering_report"] = message.drive.steering_angle, self.get_clock().now()
 
     def pose(self, frame: str) -> TransformStamped:
         """Where a frame is in the map.
@@ -74,17 +104,28 @@ class Driver(Node):
             raise tf2_ros.TransformException(f"{frame}: {age:.2f} s old; {STALE} s at most")
         return found
 
+    def check(self, topic: str) -> None:
+        """Raises tf2_ros.TransformException where no message of a topic came lately."""
+        if topic not in self.heard:
+            raise tf2_ros.TransformException(f"{topic}: nothing has come")
+        age = (self.get_clock().now() - self.heard[topic]).nanoseconds * 1e-9
+        if age > STALE:
+            raise tf2_ros.TransformException(f"{topic}: {age:.2f} s old; {STALE} s at most")
+
     def step(self) -> None:
         """One observation and one command."""
         try:
             tractor, trailer = self.pose("base_link"), self.pose("trailer_link")
+            self.check("odom")
+            self.check("steering_report")
         except tf2_ros.TransformException as error:
             self.get_logger().warning(f"the truck brakes: {error}")
             self.brake()
             return
         place = tractor.transform.translation
         position = np.array([[place.x, place.y]])
-        heading, trailer_heading = (np.array([yaw(found.transform.rotation)]) for found in (tractor, trailer))
+        self.trailer = Trailer.of(trailer, self.trailer)
+        heading, trailer_heading = np.array([yaw(tractor.transform.rotation)]), np.array([self.trailer.heading])
         speed = np.array([self.speed])
         if self.begun:
             seen = self.observer.observe(
@@ -95,6 +136,9 @@ class Driver(Node):
                 steering=np.array([self.steering]),
                 target_speed=self.target,
                 acceleration=(speed - self.speed_before) / PERIOD,
+                lateral_acceleration=speed * np.cos(heading - trailer_heading) * self.trailer.yaw_rate,
+                trailer_roll=np.array([self.trailer.roll]),
+                trailer_roll_rate=np.array([self.trailer.roll_rate]),
             )
         else:
             seen = self.observer.begin(position, heading, trailer_heading, speed)
@@ -123,6 +167,12 @@ def yaw(rotation: Quaternion) -> float:
     """Heading of a quaternion [rad]."""
     x, y, z, w = rotation.x, rotation.y, rotation.z, rotation.w
     return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+
+
+def roll(rotation: Quaternion) -> float:
+    """Roll of a quaternion, to the right [rad]."""
+    x, y, z, w = rotation.x, rotation.y, rotation.z, rotation.w
+    return math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
 
 
 def main() -> None:

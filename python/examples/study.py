@@ -40,9 +40,9 @@ LEARNERS: dict[str, tuple[type[BaseAlgorithm], int, dict[str, Any]]] = {
 class Study(VecEnvWrapper):
     """The chosen values of the observation, and a reward of its own: progress, less leaving the lane and failing."""
 
-    def __init__(self, trucks: RoundaboutVecEnv, names: list[str] | None) -> None:
+    def __init__(self, trucks: RoundaboutVecEnv, names: list[str]) -> None:
         self.batch = trucks.batch
-        groups = [values for values in offtrack_sim.OBSERVATION if names is None or values.name in names]
+        groups = [values for values in offtrack_sim.OBSERVATION if values.name in names]
         self.rows = np.concatenate([np.arange(values.first, values.first + values.n) for values in groups])
         super().__init__(trucks, gymnasium.spaces.Box(-1.0, 1.0, (len(self.rows),), np.float32))
 
@@ -76,7 +76,7 @@ def offtrack(*arguments: object) -> None:
     subprocess.run(command, check=True)
 
 
-def train(learner: str, seed: int, names: list[str] | None, args: argparse.Namespace) -> int:
+def train(learner: str, seed: int, names: list[str], args: argparse.Namespace) -> int:
     """Trains a policy, writes it as a file and evaluates it; returns the env steps that it took."""
     kind, n_envs, settings = LEARNERS[learner]
     trucks = VecMonitor(Study(RoundaboutVecEnv(args.benchmark, n_envs, seed=seed), names))
@@ -100,7 +100,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("study"), help="folder of all that is written")
     args = parser.parse_args()
     torch.set_num_threads(1)
-    names = SENSORS if args.observe == "sensors" else None
+    names = SENSORS if args.observe == "sensors" else [values.name for values in offtrack_sim.OBSERVATION]
     steps = {name: [train(name, seed, names, args) for seed in range(args.seeds)] for name in LEARNERS}
     table = args.out / "table.tex"
     sides = [args.out / name for name in LEARNERS]

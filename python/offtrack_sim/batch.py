@@ -75,7 +75,7 @@ class Batch(_offtrack.Batch):
             vehicle of a benchmark that has one is ``""``.
         vehicle_classes: Index into ``classes`` of each vehicle that episodes draw from, ``[n_vehicles]``: vehicles of
             one class differ where the benchmark draws dimensions.
-        split: Which split's routes these are; ``"routes"`` where some were named that are not all of one.
+        split: Which split's routes these are; ``"routes"`` where some were named that are not all of one, or of none.
         split_routes: The same names in the benchmark's order. Episode ``e`` of ``episodes`` on its n-th route has the
             stream ``(seed, n * episodes + e)`` in an evaluation.
 
@@ -197,7 +197,8 @@ class Batch(_offtrack.Batch):
         super().step_into(actions, observation, reward, terminated, truncated)
 
     def step_at_random(self) -> None:
-        """One step of every truck with actions that are drawn from its stream, for measuring; nothing is returned."""
+        """One step of every truck with actions that are drawn from its stream, for measuring; nothing is returned, and
+        :meth:`ended` tells nothing of it."""
         super().step_at_random()
 
     def observation(self) -> Floats:
@@ -235,7 +236,8 @@ class Batch(_offtrack.Batch):
         return found
 
     def ended(self) -> Ends | None:
-        """The episodes that the last step ended, None where it ended none or ``begin`` or ``restore`` came after it."""
+        """The episodes that the last step ended, None where it ended none or was ``step_at_random``, or ``begin`` or
+        ``restore`` came after it."""
         found = self.last_ended()
         return None if found is None else Ends(*found)
 

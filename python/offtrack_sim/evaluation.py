@@ -18,7 +18,7 @@ from .policy import Policy
 from .scenarios import Scenario, whole
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Evaluation:
     """What an evaluation found."""
 

@@ -10,7 +10,7 @@ from .episodes import Floats
 Layer = tuple[Floats, Floats]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Network:
     """Layers, and what stands before, between and behind them; see docs/policies.md."""
 

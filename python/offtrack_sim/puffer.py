@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from .batch import Batch, Bools
 from .episodes import Floats
 from .layout import Ended
 from .scenarios import Scenario
-from .single import action_space, observation_space
+from .single import action_space, check_alone, observation_space
 
 Buffers = tuple[Floats, Floats, Bools, Bools, list[dict[str, list[float]]]]
 
@@ -51,6 +51,11 @@ class RoundaboutPuffer(pufferlib.PufferEnv):
         reward_scale: Factor of all rewards.
         buf: PufferLib's buffers; None: it makes them.
         seed: Seed where ``reset`` is called without one, ``0..2**32``.
+        max_episode_steps: Steps after which an episode is truncated in any case; None for the benchmark's limit alone.
+        weights: How often routes are drawn, as for :class:`offtrack_sim.Batch`; ``batch.weigh`` changes it.
+
+    Raises:
+        ValueError: As :class:`offtrack_sim.Batch` says, and for a benchmark whose trucks share roads.
     """
 
     def __init__(
@@ -65,11 +70,21 @@ class RoundaboutPuffer(pufferlib.PufferEnv):
         reward_scale: float = 0.002,
         buf: Any = None,
         seed: int = 0,
+        max_episode_steps: int | None = None,
+        weights: Mapping[str, float] | None = None,
     ) -> None:
-        threads = num_threads
         self.batch = Batch(
-            scenario, num_envs, split=split, routes=routes, seed=seed, num_threads=threads, device=device
+            scenario,
+            num_envs,
+            split=split,
+            routes=routes,
+            seed=seed,
+            num_threads=num_threads,
+            device=device,
+            max_episode_steps=max_episode_steps,
+            weights=weights,
         )
+        check_alone(self.batch, "PufferLib")
         self.single_observation_space = observation_space(len(self.batch.extras), vehicles=self.batch.observes_vehicles)
         self.single_action_space = action_space(self.batch)
         self.num_agents = num_envs
@@ -98,11 +113,9 @@ class RoundaboutPuffer(pufferlib.PufferEnv):
 
     def step(self, actions: npt.NDArray[Any]) -> Buffers:
         """One step of every truck, 0.1 s."""
-        # Trucks that share a road wait for each other.
-        waited = self.batch.waiting()
         self.batch.step_into(actions, self.observations, self.rewards, self.terminals, self.truncations)
         self._returns += self.rewards
-        self._lengths += ~waited
+        self._lengths += 1
         self.rewards *= self.reward_scale
         infos = []
         ends = self.batch.ended()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,14 @@ from .batch import Batch, Bools
 from .episodes import Floats
 from .layout import Ended
 from .scenarios import Scenario
-from .single import action_space, check_render_mode, checked_options, observation_space
+from .single import (
+    action_space,
+    check_alone,
+    check_render_mode,
+    checked_options,
+    frames_per_second,
+    observation_space,
+)
 
 Indices = int | Iterable[int] | None
 
@@ -48,6 +55,11 @@ class RoundaboutVecEnv(VecEnv):
         num_threads: Threads that step the trucks; None for one a core.
         device: ``"cpu"``, ``"gpu"`` or part of an adapter's name.
         render_mode: None, or ``"rgb_array"`` for pictures of ``render_size`` pixels a side.
+        max_episode_steps: Steps after which an episode is truncated in any case; None for the benchmark's limit alone.
+        weights: How often routes are drawn, as for :class:`offtrack_sim.Batch`; ``batch.weigh`` changes it.
+
+    Raises:
+        ValueError: As :class:`offtrack_sim.Batch` says, and for a benchmark whose trucks share roads.
     """
 
     def __init__(
@@ -62,19 +74,31 @@ class RoundaboutVecEnv(VecEnv):
         device: str = "cpu",
         render_mode: str | None = None,
         render_size: int = 480,
+        max_episode_steps: int | None = None,
+        weights: Mapping[str, float] | None = None,
     ) -> None:
         check_render_mode(render_mode)
         if seed is None:
             seed = int(np.random.SeedSequence().generate_state(1)[0])
-        threads = num_threads
         self.batch = Batch(
-            scenario, num_envs, split=split, routes=routes, seed=seed, num_threads=threads, device=device
+            scenario,
+            num_envs,
+            split=split,
+            routes=routes,
+            seed=seed,
+            num_threads=num_threads,
+            device=device,
+            max_episode_steps=max_episode_steps,
+            weights=weights,
         )
+        check_alone(self.batch, "Stable-Baselines3")
         self.render_mode = render_mode
         self.render_size = render_size
         self._streams: list[tuple[int, int] | None] = [(seed, env) for env in range(num_envs)]
         space = observation_space(len(self.batch.extras), vehicles=self.batch.observes_vehicles)
         super().__init__(num_envs, space, action_space(self.batch))
+        # `VecVideoRecorder` reads it.
+        self.metadata: dict[str, Any] = {**self.metadata, "render_fps": frames_per_second(self.batch)}
 
     def __copy__(self) -> RoundaboutVecEnv:
         # A step of a copy that shared the batch would move this one's trucks.
@@ -105,11 +129,11 @@ class RoundaboutVecEnv(VecEnv):
 
     def step_wait(self) -> tuple[Floats, Floats, Bools, list[dict[str, Any]]]:
         """One step of every truck, 0.1 s."""
-        waited = self.batch.waiting()
         observation, reward, terminated, truncated = self.batch.step(self._actions)
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         ends = self.batch.ended()
         if ends is not None:
+            routes, vehicles = self.batch.routes(), self.batch.vehicles()
             for env, code, route, last, vehicle in zip(*ends):
                 infos[env] = {
                     "terminal_observation": last,
@@ -118,11 +142,6 @@ class RoundaboutVecEnv(VecEnv):
                     "ended": int(code),
                     **self.batch.named(route, vehicle),
                 }
-                waited[env] = True
-        begun = np.flatnonzero(waited & ~self.batch.waiting())
-        if len(begun):
-            routes, vehicles = self.batch.routes(), self.batch.vehicles()
-            for env in begun:
                 self.reset_infos[env] = self.batch.named(routes[env], vehicles[env])
         return observation, reward, terminated | truncated, infos
 
@@ -157,10 +176,9 @@ class RoundaboutVecEnv(VecEnv):
             raise AttributeError(
                 f"{method_name}: trucks of one batch have no methods of their own but render; see `batch`"
             )
-        return [
-            self.batch.render(env, *(method_args or (self.render_size,)), **method_kwargs)
-            for env in self._chosen(indices)
-        ]
+        if not method_args:
+            method_kwargs = {"size": self.render_size} | method_kwargs
+        return [self.batch.render(env, *method_args, **method_kwargs) for env in self._chosen(indices)]
 
     def env_is_wrapped(self, wrapper_class: type[Any], indices: Indices = None) -> list[bool]:
         """No truck is wrapped on its own."""

@@ -74,11 +74,11 @@ class Benchmark:
 
         Args:
             changes: A value for each key. A key is written with dots, and with an index where it is one of several
-                tables: ``"roundabout[0].train"``; None removes it.
+                tables: ``"roundabout[0].train"``. A table that is not there is made; None removes a key.
             name: Name of the other benchmark.
 
         Raises:
-            KeyError: For a table or an index that there is not.
+            KeyError: For an index that there is not, and a key of what is no table.
             TypeError, ValueError: For values as above.
         """
         if not isinstance(changes, Mapping):
@@ -198,6 +198,8 @@ def _change(keys: dict[str, Any], key: str, value: Any) -> None:
     place: Any = keys
     for step, following in itertools.pairwise(steps):
         if isinstance(step, str) and isinstance(place, dict):
+            if value is None and step not in place:
+                return
             place = place.setdefault(step, [] if isinstance(following, int) else {})
         elif isinstance(step, int) and isinstance(place, list) and step < len(place):
             place = place[step]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import operator
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import gymnasium
@@ -53,6 +53,7 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], Any]):
         device: ``"cpu"``, ``"gpu"`` or part of an adapter's name.
         numeric_infos: Whether infos have indices in place of names, ``route`` in ``batch.route_names`` and ``vehicle``
             in ``batch.vehicle_classes``, as ``gymnasium.wrappers.NumpyToTorch`` needs them.
+        weights: How often routes are drawn, as for :class:`offtrack_sim.Batch`; ``batch.weigh`` changes it.
 
     Copies (``copy.copy``, ``copy.deepcopy``) and pickles go on from the environment's state, independent of it.
 
@@ -74,9 +75,19 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], Any]):
         render_size: int = 480,
         device: str = "cpu",
         numeric_infos: bool = False,
+        weights: Mapping[str, float] | None = None,
     ) -> None:
         check_render_mode(render_mode)
-        self.batch = Batch(scenario, 1, split=split, routes=routes, autoreset="disabled", num_threads=1, device=device)
+        self.batch = Batch(
+            scenario,
+            1,
+            split=split,
+            routes=routes,
+            autoreset="disabled",
+            num_threads=1,
+            device=device,
+            weights=weights,
+        )
         self.observation_space = observation_space(len(self.batch.extras), vehicles=self.batch.observes_vehicles)  # type: ignore[assignment]
         self.action_space = action_space(self.batch)
         self.metadata = {**self.metadata, "render_fps": frames_per_second(self.batch)}
@@ -156,6 +167,14 @@ def check_render_mode(render_mode: str | None) -> None:
         raise ValueError(
             f'render_mode: {render_mode!r}; must be None or "rgb_array" (for a window: HumanRendering of gymnasium)'
         )
+
+
+def check_alone(batch: Batch, learner: str) -> None:
+    """An error where trucks share a road: one whose episode has ended waits for the others, which a learner that knows
+    nothing of it takes for steps."""
+    if batch.group != 1:
+        needed = f"{learner} takes trucks that drive alone: leave the key out, or use Batch and its waiting()"
+        raise ValueError(f"scenario: traffic.group: {batch.group}; {needed}")
 
 
 def frames_per_second(batch: Batch) -> int:

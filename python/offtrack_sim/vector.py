@@ -40,13 +40,15 @@ class RoundaboutVector(Base):
     - ``batch`` is the simulator, with all its columns.
     - Infos have the form of Gymnasium's ``SyncVectorEnv``: an array ``key`` and a mask ``_key`` for ``route`` where an
       episode began and for ``ended``, ``is_success`` and ``route`` where one ended, and nothing where neither did. With
-      ``SAME_STEP`` those of the end are in ``final_info``, and ``final_obs`` has the last observations. Trucks that
-      share a road begin together, see :meth:`offtrack_sim.Batch.waiting`. Where the
+      ``SAME_STEP`` those of the end are in ``final_info``, and ``final_obs`` has the last observations. Where the
       benchmark has several vehicles or loads, ``vehicle`` and ``load`` stand beside ``route``. With ``numeric_infos``
       all of them are arrays of numbers.
+    - Trucks that share a road (``batch.group``) begin together. What one does while it waits for the others is no
+      transition in any mode: leave out the steps before which ``batch.waiting()`` marks it.
     - Copies (``copy.copy``, ``copy.deepcopy``) and pickles go on from the state, independent of this environment.
 
-    With the same seeds every value is that of ``SyncVectorEnv`` with as many :class:`offtrack_sim.Roundabout`.
+    With the same list of seeds every value is that of ``SyncVectorEnv`` with as many :class:`offtrack_sim.Roundabout`.
+    One int gives the trucks other streams than Gymnasium's ``seed + i``, see :meth:`reset`.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}

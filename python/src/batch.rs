@@ -15,7 +15,6 @@ use numpy::{
     PyUntypedArrayMethods,
 };
 use offtrack::layout::{Column, Ended};
-use offtrack::scenario::Split;
 use offtrack::simulator::Autoreset;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -111,10 +110,7 @@ impl Batch {
     /// Which split's routes these are; `routes` where some were named that are not all of one.
     #[getter]
     fn split(&self) -> &'static str {
-        let scenario = &self.place.scenario;
-        let mut splits = Split::ALL.into_iter().filter(|&split| !scenario.split(split).is_empty());
-        let first = splits.next().map_or("routes", Split::name);
-        if splits.next().is_some() { "routes" } else { first }
+        self.place.split
     }
 
     /// Names of the routes that episodes are drawn from, in the benchmark's order.

@@ -117,12 +117,12 @@ impl Infos<'_> {
             codes[*env] = i64::from(*code);
             successes[*env] = *code == Ended::Arrived as u32;
         }
-        let has_begun = PyArray1::from_iter(py, mask.iter().zip(waiting).map(|(&ended, &waits)| ended && !waits));
-        let mask = PyArray1::from_vec(py, mask);
+        let has_begun: Vec<bool> = mask.iter().zip(waiting).map(|(&ended, &waits)| ended && !waits).collect();
         let infos = PyDict::new(py);
-        let put = |infos: &Bound<PyDict>, key: &str, values: Bound<PyAny>, mask: &Bound<PyArray1<bool>>| {
+        // Each key has a mask of its own, as in `SyncVectorEnv`: who writes into one changes no other.
+        let put = |infos: &Bound<PyDict>, key: &str, values: Bound<PyAny>, mask: &[bool]| {
             infos.set_item(key, values)?;
-            infos.set_item(format!("_{key}"), mask)
+            infos.set_item(format!("_{key}"), PyArray1::from_slice(py, mask))
         };
         put(&infos, "ended", PyArray1::from_vec(py, codes).into_any(), &mask)?;
         put(&infos, "is_success", PyArray1::from_vec(py, successes).into_any(), &mask)?;

@@ -31,6 +31,8 @@ pub struct Place {
     pub scenario: Arc<Scenario>,
     /// The benchmark, baked.
     pub world: Arc<World>,
+    /// Name of the split that all of these routes are of, or `routes`.
+    pub split: &'static str,
     /// Routes to draw from, as indices into the world's.
     pub routes: Vec<u32>,
     /// Steps after which an episode is timed out in any case, where the caller says so.
@@ -87,12 +89,13 @@ impl Place {
         let cache = Cache::of_user();
         let loading = Loading { cache: cache.as_ref(), stop, ..Loading::PLAIN };
         let mut scenario = asked.scenario.load(&loading)?;
-        routes::narrow(&mut scenario, asked.split, asked.routes)?;
+        let split = routes::narrow(&mut scenario, asked.split, asked.routes)?;
         let scenario = change(scenario);
         let limit = asked.max_episode_steps;
         // Held while a world is baked, so that two threads do not bake the same one.
         let mut baked = baked(stop).map_err(|stopped| PyValueError::new_err(stopped.to_string()))?;
-        let known = |place: &&Place| place.max_episode_steps == limit && *place.scenario == scenario;
+        let known =
+            |place: &&Place| (place.max_episode_steps, place.split) == (limit, split) && *place.scenario == scenario;
         if let Some(place) = baked.iter().find(known) {
             return Ok(place.clone());
         }
@@ -106,7 +109,8 @@ impl Place {
             world.step_limits.iter_mut().for_each(|steps| *steps = (*steps).min(limit.saturating_sub(1)));
         }
         let routes = Split::ALL.iter().flat_map(|&split| scenario.split(split)).copied().collect();
-        let place = Place { scenario: Arc::new(scenario), world: Arc::new(world), routes, max_episode_steps: limit };
+        let (scenario, world) = (Arc::new(scenario), Arc::new(world));
+        let place = Place { scenario, world, split, routes, max_episode_steps: limit };
         if baked.len() == KEPT {
             baked.remove(0);
         }

@@ -113,6 +113,17 @@ def test_results_go_into_the_buffers_that_were_given(puffer: types.ModuleType) -
     assert env.observations is buffers["observations"] and buffers["observations"].any()
 
 
+def test_trucks_that_share_a_road_are_refused_and_routes_are_drawn_by_weights(puffer: types.ModuleType) -> None:
+    shared = offtrack_sim.benchmark("traffic2026").changed({"traffic.group": 2})
+    with pytest.raises(ValueError, match=r"traffic\.group: 2; PufferLib takes trucks that drive alone"):
+        puffer.RoundaboutPuffer(shared, num_envs=4)
+    env = puffer.RoundaboutPuffer(num_envs=N, weights={"32m": 0.0, "50m": 0.0}, max_episode_steps=5)
+    env.reset()
+    assert {env.batch.route_names[route].split("/")[0] for route in env.batch.routes()} == {"16m"}
+    ended = [env.step(np.zeros(N, np.int64))[3].copy() for _ in range(5)]
+    assert not ended[3].any() and ended[4].all()
+
+
 def test_the_package_imports_no_learning_library() -> None:
     import subprocess
 

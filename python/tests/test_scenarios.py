@@ -99,6 +99,8 @@ def test_a_wrong_benchmark_names_key_value_and_what_would_do() -> None:
         offtrack_sim.Benchmark({"actions": {"steer_levels": [0.0, float("inf")]}})
     with pytest.raises(TypeError, match="vehicle: .1.; a number, a text, a list or a table"):
         offtrack_sim.Benchmark({"vehicle": {1}})
+    # What is not there need not be removed, nor the table that it would be in.
+    assert shipped.changed({"traffic.group": None, "vehicle": None}).keys.keys() == shipped.keys.keys() - {"vehicle"}
     for key in ("roundabout[9].train", "vehicle.file", "a..b", ""):
         with pytest.raises(KeyError, match="there is no such table|names with dots"):
             shipped.changed({key: 1})

@@ -174,6 +174,19 @@ def test_a_batch_that_was_put_elsewhere_is_believed() -> None:
     single.step(4)
 
 
+@pytest.mark.parametrize("mode", ["next_step", "same_step"])
+def test_who_writes_into_a_mask_of_infos_changes_no_other(mode: str, short_benchmark: str) -> None:
+    envs = offtrack_sim.make_vec(short_benchmark, num_envs=2, autoreset_mode=mode)
+    envs.reset(seed=0)
+    infos: dict[str, Any] = {}
+    while not infos:
+        infos = envs.step(np.zeros(2, np.int64))[4]
+    of_end = infos.get("final_info", infos)
+    assert of_end["_ended"].any()
+    of_end["_ended"][:] = False
+    assert of_end["_is_success"].any() and of_end["_route"].any() and infos.get("_final_info", of_end["_route"]).any()
+
+
 def test_seeds_and_starts_are_sequences() -> None:
     env = offtrack_sim.make_vec("attard2023", 2)
     first = env.reset(seed=np.array(7))[0]  # type: ignore[arg-type]

@@ -14,8 +14,9 @@ const LONGEST_LIST: usize = 600;
 const LONGEST_NAME: usize = 100;
 
 /// Leaves the scenario the routes of a split, or those of any split that `names` has: each a route, or all routes of a
-/// roundabout. One that the benchmark does not have is added, as `wide/7/12` is.
-pub fn narrow(scenario: &mut Scenario, split: &str, names: Option<&[String]>) -> PyResult<()> {
+/// roundabout. One that the benchmark does not have is added, as `wide/7/12` is. Returns the name of the split that all of
+/// these are of, or `routes`.
+pub fn narrow(scenario: &mut Scenario, split: &str, names: Option<&[String]>) -> PyResult<&'static str> {
     let Some(split) = Split::ALL.into_iter().find(|known| known.name() == split) else {
         let known = Split::ALL.map(Split::name).join(", ");
         return Err(PyValueError::new_err(format!("split: {split:?}; must be one of {known}")));
@@ -31,7 +32,7 @@ pub fn narrow(scenario: &mut Scenario, split: &str, names: Option<&[String]>) ->
             )));
         }
         scenario.keep(&[split]);
-        return Ok(());
+        return Ok(split.name());
     };
     if names.is_empty() {
         return Err(PyValueError::new_err(
@@ -69,7 +70,9 @@ pub fn narrow(scenario: &mut Scenario, split: &str, names: Option<&[String]>) ->
         )));
     }
     scenario.retain(|_, route| wanted.iter().any(|name| is_of(&route.name, name)));
-    Ok(())
+    let mut splits = Split::ALL.into_iter().filter(|&split| !scenario.split(split).is_empty());
+    let first = splits.next().filter(|_| added.is_empty() && splits.next().is_none());
+    Ok(first.map_or("routes", Split::name))
 }
 
 fn known(scenario: &Scenario) -> Vec<String> {
