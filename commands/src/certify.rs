@@ -39,8 +39,8 @@ pub struct Args {
     /// Which routes: `test`, `validation`, `train` or `all`.
     #[arg(long, default_value = "all", value_parser = ["test", "validation", "train", "all"])]
     split: String,
-    /// Only this route of the split, 20m/N-left-3, or all of a roundabout's, 20m; repeatable. A random road need not be
-    /// in the benchmark: wide/7/12/N-left-3, or all of wide/7/12.
+    /// Only this route of the split, 20m/N-left-4, or all of a roundabout's, 20m; repeatable. A random road need not be
+    /// in the benchmark: wide/7/12/S-left-3, or all of wide/7/12.
     #[arg(long)]
     route: Vec<String>,
     /// Only trucks with this load, where the benchmark has several: the search drives the first of them.

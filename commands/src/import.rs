@@ -21,6 +21,9 @@ use offtrack_evaluation::files;
 use crate::outputs;
 use drawing::DrawingArgs;
 
+/// A ring that is farther than this from the place that was given for it is said to be (m).
+const FAR: f64 = 100.0;
+
 /// List the roundabouts or junctions of an OpenDRIVE map, check it, or write one of them as an outline file.
 #[derive(Debug, clap::Args)]
 #[command(group(clap::ArgGroup::new("action").args(["list", "junctions", "check", "output"]).required(true)))]
@@ -176,6 +179,11 @@ pub fn run(args: &Args) -> Result<(), Error> {
     if let Some(file) = &args.json {
         files::write_json(file, &Written::of(&imported))?;
     }
+    let far = args.place.ring.map(|near| near.distance(imported.centre)).filter(|far| FAR < *far);
+    if let Some(far) = far {
+        let (x, y) = (imported.centre.x, imported.centre.y);
+        files::say(&format!("--ring: the nearest ring, at {x:.1},{y:.1}, is {far:.0} m away"));
+    }
     files::print(&summary(output, &imported, "warning"))
 }
 
@@ -232,7 +240,18 @@ fn text(file: &Path, output: &Path, map: &Map, choice: &Choice, imported: &Impor
     comment.push(
         "A path is a list of [x, y] and [x, y, bulge]: a straight or an arc ends there. Metres; docs/maps.md.".into(),
     );
-    Ok(ground.checked_text(output, &comment)?)
+    ground.checked_text(output, &comment).map_err(|error| of_input(error, file))
+}
+
+/// An error of an outline that is not written, by the file that it was read from.
+fn of_input(error: InputError, input: &Path) -> Error {
+    match error {
+        InputError::Invalid { key, value, expected, .. } => {
+            let key = format!("the outline that it becomes: {key}");
+            InputError::Invalid { file: input.to_owned(), key, value, expected }.into()
+        }
+        other => other.into(),
+    }
 }
 
 /// Prints the rings; a map without one that can be driven is wrong input.

@@ -30,7 +30,7 @@ use crate::{devices, outputs, policies, progress, roads};
 pub struct Args {
     #[command(flatten)]
     policy: policies::Choice,
-    /// One of the benchmark's routes, of any split: 20m/N-left-3; or one of a random road: wide/7/12/N-left-3. A film
+    /// One of the benchmark's routes, of any split: 20m/N-left-4; or one of a random road: wide/7/12/S-left-3. A film
     /// may have several, each with its own --route, one after another.
     #[arg(long, required = true)]
     route: Vec<String>,

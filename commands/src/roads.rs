@@ -8,6 +8,7 @@ use offtrack::files::reader::shortened;
 use offtrack::files::shipped::Kind;
 use offtrack::map::Road;
 use offtrack::map::chosen::is_map;
+use offtrack::map::drawing::is_drawing;
 use offtrack::map::procedural;
 use offtrack::scenario::{Place, Scenario, Split};
 use offtrack::world::World;
@@ -41,6 +42,10 @@ pub fn asked(asked: &Asked, split: Split) -> Result<Scenario, Error> {
 /// A road by its name, the path of its file or of a map, of which the flags choose a place; or a random road.
 pub fn road(name: &str, place: &PlaceArgs) -> Result<Road, Error> {
     let file = Path::new(name);
+    if is_drawing(file) {
+        let expected = "is a drawing: `offtrack import` makes an outline of it, NAME.outline.toml; give that";
+        return Err(Error::Setting { name: "ROAD", value: name.to_owned(), expected: expected.into() });
+    }
     Ok(if is_map(file) { Road::from_map(file, &place.choice())? } else { procedural::find(name)? })
 }
 

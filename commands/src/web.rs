@@ -35,7 +35,7 @@ pub struct Args {
     /// The folder of a training run: a slider goes through the policies that it kept on its way.
     #[arg(long)]
     run: Option<PathBuf>,
-    /// Only this road, 20m, or this route, 20m/N-left-3; repeatable. A random road need not be in a benchmark:
+    /// Only this road, 20m, or this route, 20m/N-left-4; repeatable. A random road need not be in a benchmark:
     /// wide/7/12.
     #[arg(long)]
     road: Vec<String>,

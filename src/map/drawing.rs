@@ -19,6 +19,7 @@ use glam::DVec2;
 pub use dxf::Unit;
 pub use site::Drawn;
 
+use super::opendrive::of_windows_1252;
 use crate::files::reader::{Error, read_bytes};
 use crate::geometry::Curve;
 
@@ -67,8 +68,17 @@ pub struct Layers {
 /// The file and what is wrong: no DXF in ASCII, a unit that is unknown, an outline that is open, a layer without
 /// anything, coordinates in degrees, and so on, each with its line or feature and what would do.
 pub fn read(file: &Path, layers: &Layers) -> Result<Drawn, Error> {
-    let bytes = read_bytes(file, FILE_LIMIT)?;
-    parse(file, &String::from_utf8_lossy(&bytes), layers)
+    parse(file, &text(file, &read_bytes(file, FILE_LIMIT)?), layers)
+}
+
+/// The text of a drawing's bytes: UTF-8, and of a DXF that is none the code page that most have.
+fn text(file: &Path, bytes: &[u8]) -> String {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    match std::str::from_utf8(bytes) {
+        Ok(text) => text.to_owned(),
+        Err(_) if is_geojson(file) => String::from_utf8_lossy(bytes).into_owned(),
+        Err(_) => of_windows_1252(bytes),
+    }
 }
 
 fn parse(file: &Path, text: &str, layers: &Layers) -> Result<Drawn, Error> {

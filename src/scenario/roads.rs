@@ -20,6 +20,8 @@ use crate::map::route::Route;
 pub(super) const MOST_ROADS: usize = 100_000;
 /// Maximum number of roads in a seed of which a benchmark uses some.
 const MOST_INDICES: usize = 1_000_000;
+/// Largest coordinate of a ring in its map (m).
+const FARTHEST_RING: f64 = 1e8;
 
 /// Random roads of a benchmark, by split.
 pub(super) struct Procedural {
@@ -85,6 +87,9 @@ impl Scenario {
         let read = |source: &Source| match source {
             Source::Disk(file) if is_map(file) => {
                 let WrittenRoundabout { hand, name, arms, .. } = written;
+                for (index, value) in written.ring.into_iter().flatten().enumerate() {
+                    reader.within(&format!("{key}.ring[{index}]"), value, -FARTHEST_RING..=FARTHEST_RING, "m")?;
+                }
                 let ring = written.ring.map(DVec2::from);
                 let ways =
                     written.way.iter().map(|way| Way { from: (&way.from).into(), to: (&way.to).into() }).collect();
@@ -113,7 +118,10 @@ impl Scenario {
             return Err(reader.invalid(
                 format!("{key}.file"),
                 written.file.display(),
-                "each roundabout may be listed once",
+                format!(
+                    "each roundabout may be listed once, and {} is: leave it out, or give a map another `name`",
+                    roundabout.name
+                ),
             ));
         }
         let routes = self.routes_of(reader, &roundabout)?;

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use offtrack::files::cache::Loading;
 use offtrack::layout::{Start, Truck};
 use offtrack::physics::drawn_start;
 use offtrack::scenario::{Fleet, Member, Ranges, Scenario};
@@ -235,4 +236,23 @@ fn a_simulator_of_one_vehicle_has_one_row() {
             && world.rays.len() == 1
             && simulator.batch().truck.iter().all(|truck| truck.vehicle == 0)
     );
+}
+
+#[test]
+fn what_no_vehicle_file_may_have_is_not_drawn_either() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+    let text = std::fs::read_to_string(folder.join("transfer2026.toml")).unwrap();
+    let refused = |key: &str, range: &str| {
+        let line = text.lines().find(|line| line.starts_with(&format!("{key} = "))).unwrap();
+        let changed = text.replacen(line, &format!("{key} = {range}"), 1);
+        Scenario::parse("mine", &changed, Some(&folder), &Loading::PLAIN).unwrap_err().to_string()
+    };
+    for (key, range, said) in [
+        ("trailer_wheelbase", "[-3.0, 0.0]", "draw: model.slip_lever: 4; of daf_xf with all ranges at their ends"),
+        ("centre_of_gravity", "[-1.0, 0.0]", ".suspension.centre_of_gravity: "),
+        ("tractor_wheelbase", "[-3.0, 0.0]", "draw: tractor.wheelbase: "),
+    ] {
+        let found = refused(key, range);
+        assert!(found.contains(said) && found.contains("must lie in "), "{found}");
+    }
 }

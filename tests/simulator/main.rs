@@ -34,6 +34,7 @@ mod map_junctions;
 mod map_kinds;
 mod map_lanes;
 mod map_objects;
+mod map_records;
 mod maps;
 mod modules;
 mod observe;

@@ -137,7 +137,7 @@ fn bad_features_are_refused_by_their_number_and_what_would_do() {
     };
     let geometry = |features: &mut Value, index: usize| features["features"][index]["geometry"].take();
     type Change = Box<dyn Fn(&mut Value)>;
-    let cases: [(Change, &str); 11] = [
+    let cases: [(Change, &str); 14] = [
         (Box::new(|f| f["type"] = "Feature".into()), "type: \"Feature\"; must be \"FeatureCollection\""),
         (
             Box::new(|f| drop(f["features"][0]["geometry"]["coordinates"][1].as_array_mut().unwrap().pop())),
@@ -160,6 +160,9 @@ fn bad_features_are_refused_by_their_number_and_what_would_do() {
         (Box::new(|f| f["features"][1]["geometry"]["coordinates"] = json!([])), "feature 2: coordinates: no positions"),
         (Box::new(|f| f["features"][0]["properties"] = Value::Null), "part KERB: none; a feature's property `part`"),
         (Box::new(|f| f["features"][1]["properties"]["width"] = json!(0.0)), "feature 2: widths: 0 m"),
+        (Box::new(|f| f["features"][1]["properties"]["width"] = json!("4.5")), "feature 2: width: \"4.5\"; must be"),
+        (Box::new(|f| f["features"][1]["properties"]["widths"] = json!([4, 4])), "feature 2: widths: [4,4]; must be"),
+        (Box::new(|f| f["features"][1]["properties"]["widths"] = json!([4, 4, null])), "a list of three"),
         (
             Box::new(|f| f["crs"] = json!({"type": "name", "properties": {"name": "EPSG:4326"}})),
             "crs: EPSG:4326; coordinates must be metres, not degrees",

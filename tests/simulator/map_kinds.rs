@@ -221,7 +221,7 @@ fn grades_and_crossfall_are_warned_of_with_their_largest_value() {
     let (of_map, of_ring) = with(superelevation);
     // tan(0.17) = 0.172.
     assert!(
-        of_map.contains("1 of 20 roads have a crossfall (superelevation, shape), up to 17.2 % on road 1"),
+        of_map.contains("1 of 20 roads have a crossfall (superelevation, crossfall, shape), up to 17.2 % on road 1"),
         "{of_map}"
     );
     assert!(of_ring.contains("crossfall of up to 17.2 % (road 1)"), "{of_ring}");

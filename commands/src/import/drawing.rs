@@ -107,7 +107,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
         format!("A roundabout of the drawing {name}: its centre, here the origin, lies at `origin` there."),
         "A path is a list of [x, y] and [x, y, bulge]: a straight or an arc ends there. Metres; docs/maps.md.".into(),
     ];
-    files::write_whole(output, ground.checked_text(output, &comment)?.as_bytes())?;
+    let text = ground.checked_text(output, &comment).map_err(|error| super::of_input(error, &args.map))?;
+    files::write_whole(output, text.as_bytes())?;
     let imported = Imported { centre: ground.origin, ground, warnings: notes };
     if let Some(file) = &args.json {
         files::write_json(file, &Written::of(&imported))?;

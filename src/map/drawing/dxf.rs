@@ -131,7 +131,11 @@ impl Drawing {
         }
         for (layer, kind) in [(&layers.kerbs, &drawing.kerbs), (&layers.lanes, &drawing.lanes)] {
             if kind.is_empty() {
-                let known: Vec<String> = others.iter().map(|(layer, n)| format!("{layer} ({n})")).collect();
+                let own = [(&layers.kerbs, &drawing.kerbs), (&layers.lanes, &drawing.lanes)];
+                let own =
+                    own.into_iter().filter(|(_, kind)| !kind.is_empty()).map(|(layer, kind)| (&**layer, kind.len()));
+                let others = others.iter().map(|(layer, n)| (*layer, *n));
+                let known: Vec<String> = own.chain(others).map(|(layer, n)| format!("{layer} ({n})")).collect();
                 let has = if known.is_empty() { "nothing".into() } else { known.join(", ") };
                 return Err(reader.invalid(format!("layer {layer}"), "empty", format!("the drawing has {has}")));
             }
@@ -156,7 +160,9 @@ impl Drawing {
 
 /// A drawing of a roundabout reaches over tens or hundreds of metres; one whose unit is not what it says does not.
 fn reach(reader: &Reader, kerbs: &[Entity]) -> Result<(), Error> {
-    let ends = kerbs.iter().flat_map(|kerb| kerb.curve.pieces.iter().flat_map(|piece| [piece.start(), piece.end()]));
+    // A circle ends where it begins.
+    let along = |piece: &Piece| [0.0, 0.25, 0.5, 0.75, 1.0].map(|part| piece.point_at(part * piece.length()));
+    let ends = kerbs.iter().flat_map(|kerb| kerb.curve.pieces.iter().flat_map(along));
     let (low, high) = ends.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
     let over = (high - low).max_element();
     if REACH.contains(&over) {

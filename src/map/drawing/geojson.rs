@@ -65,14 +65,15 @@ impl Feature {
         NAMES.iter().find_map(|name| properties?.get(*name)?.as_str()).unwrap_or_default()
     }
 
-    /// The widths that a lane says: three, or one for all (m).
-    fn widths(&self) -> Option<[f64; 3]> {
-        let properties = self.properties.as_ref()?;
-        if let Some(width) = properties.get("width").and_then(Value::as_f64) {
-            return Some([width; 3]);
+    /// The widths that a lane says: three, or one for all (m); an error names what is neither.
+    fn widths(&self) -> Result<Option<[f64; 3]>, (&'static str, &Value)> {
+        let given = |key| self.properties.as_ref().and_then(|all| all.get(key)).filter(|value| !value.is_null());
+        if let Some(width) = given("width") {
+            return width.as_f64().map(|width| Some([width; 3])).ok_or(("width", width));
         }
-        let widths: Vec<f64> = properties.get("widths")?.as_array()?.iter().filter_map(Value::as_f64).collect();
-        widths.try_into().ok()
+        let Some(widths) = given("widths") else { return Ok(None) };
+        let numbers = widths.as_array().and_then(|all| all.iter().map(Value::as_f64).collect::<Option<Vec<f64>>>());
+        numbers.and_then(|numbers| numbers.try_into().ok()).map(Some).ok_or(("widths", widths))
     }
 }
 
@@ -105,7 +106,13 @@ pub(super) fn drawing(file: &Path, text: &str, layers: &Layers) -> Result<Drawin
         if is(&layers.kerbs) {
             drawing.kerbs.extend(shape.kerbs(&mut left)?);
         } else if is(&layers.lanes) {
-            drawing.lanes.extend(shape.lanes(feature.widths())?);
+            let widths = feature.widths().map_err(|(key, value)| {
+                let found = shortened(&value.to_string(), 40);
+                let expected =
+                    "must be a number, or `widths` a list of three: on the entry, in the ring, on the exit (m)";
+                reader.invalid(format!("{place}: {key}"), found, expected)
+            })?;
+            drawing.lanes.extend(shape.lanes(widths)?);
         } else if is(&layers.aprons) {
             drawing.aprons.extend(shape.kerbs(&mut left)?);
         } else if is(CENTRE) && geometry.kind == "Point" {

@@ -11,7 +11,7 @@ use crate::geometry::area::densified;
 use crate::geometry::{Curve, Outline, Piece, fitted_line, wrapped};
 use crate::map::apron;
 use crate::map::ground::{Arm, Edges, Ground, Kerb, Line};
-use crate::map::opendrive::{fitted_circle, kerb_of, outer_radius, ring_radius};
+use crate::map::opendrive::{closest, fitted_circle, kerb_of, named, outer_radius, ring_radius};
 use crate::map::route::Lane;
 
 /// Ends of lines nearer than this are joined (m).
@@ -28,6 +28,8 @@ const MOST_KERBS: usize = 5000;
 const MOST_WAYS: usize = 128;
 /// Most lines of aprons, each of which is compared with every kerb.
 const MOST_APRONS: usize = 200;
+/// A way comes nearer to the ring than both of its ends by so much at least (m).
+const NEARER: f64 = 1.0;
 /// Farthest that an island may be from a circle, as a fraction of its radius.
 const ROUND: f64 = 0.3;
 
@@ -47,6 +49,7 @@ pub(super) fn drawn(file: &Path, drawing: Drawing, layers: &Layers) -> Result<Dr
     reader.count(&format!("lines on layer {}", layers.kerbs), kerbs.len(), 1..=MOST_KERBS)?;
     reader.count(&format!("lines on layer {}", layers.lanes), lanes.len(), 1..=MOST_WAYS)?;
     reader.count(&format!("lines on layer {}", layers.aprons), aprons.len(), 0..=MOST_APRONS)?;
+    let lanes = whole(lanes, &layers.lanes, &mut notes);
     let loops = closed(&reader, kerbs, &layers.kerbs, &mut notes)?;
     let aprons = closed(&reader, aprons, &layers.aprons, &mut notes)?;
     let (loops, aprons) = aprons::placed(loops, aprons);
@@ -64,8 +67,16 @@ pub(super) fn drawn(file: &Path, drawing: Drawing, layers: &Layers) -> Result<Dr
     if mirrored {
         notes.push("the ways lead clockwise around the island: left-hand traffic".into());
     }
-    let arms = arms(&reader, &ways, layers, mirrored)?;
     let outer = outer_radius(&faces, radius);
+    for (way, drawn) in ways.iter().zip(&lanes) {
+        check_way(&reader, way, drawn, outer)?;
+        if let Some((distance, at)) = closest(way, &faces) {
+            let at = centre + if mirrored { DVec2::new(at.x, -at.y) } else { at };
+            let (place, x, y) = (&drawn.place, at.x, at.y);
+            notes.push(format!("{place}: the way is {distance:.2} m from a kerb at ({x:.1}, {y:.1}) m"));
+        }
+    }
+    let arms = arms(&reader, &ways, layers, mirrored)?;
     let mut lines = lines(&reader, &lanes, &ways, &arms, (radius, outer), layers.lane_width)?;
     lines.sort_by_key(|line| (line.entry, line.lane == Lane::Right, line.exit));
     let mut lane_radii: Vec<f64> =
@@ -95,6 +106,11 @@ fn closed(reader: &Reader, drawn: Vec<Entity>, layer: &str, notes: &mut Vec<Stri
     let meets = |a: DVec2, b: DVec2| a.distance(b) <= GAP;
     let ends = |curve: &Curve| (curve.point_at(0.0), curve.point_at(curve.length()));
     let (mut loops, mut open) = (Vec::new(), Vec::new());
+    let n = drawn.len();
+    let drawn: Vec<Entity> = drawn.into_iter().filter(|one| GAP < one.curve.length()).collect();
+    if drawn.len() < n {
+        notes.push(format!("{} lines on layer {layer} that are shorter than {GAP} m are left out", n - drawn.len()));
+    }
     for one in drawn {
         let (start, end) = ends(&one.curve);
         if one.is_closed || meets(start, end) { loops.push(one.curve) } else { open.push(one) }
@@ -127,6 +143,31 @@ fn closed(reader: &Reader, drawn: Vec<Entity>, layer: &str, notes: &mut Vec<Stri
         notes.push(format!("{n_open} open lines on layer {layer} are joined to closed outlines"));
     }
     Ok(loops)
+}
+
+/// Ways, of which those that are drawn in parts are one each: an end at which one other begins, and nothing else meets.
+fn whole(mut drawn: Vec<Entity>, layer: &str, notes: &mut Vec<String>) -> Vec<Entity> {
+    let start = |one: &Entity| one.curve.point_at(0.0);
+    let end = |one: &Entity| one.curve.point_at(one.curve.length());
+    let n = drawn.len();
+    loop {
+        let follows = |from: usize, to: usize| from != to && end(&drawn[from]).distance(start(&drawn[to])) <= GAP;
+        let all = || 0..drawn.len();
+        let only = |from: usize, to: usize| {
+            let ends = all().filter(|&other| follows(other, to)).count();
+            let starts = all().filter(|&other| follows(from, other)).count();
+            (ends, starts) == (1, 1) && !follows(to, from)
+        };
+        let joint = all().flat_map(|from| all().map(move |to| (from, to)));
+        let Some((from, to)) = joint.into_iter().find(|&(from, to)| follows(from, to) && only(from, to)) else { break };
+        let pieces = drawn[to].curve.pieces.clone();
+        drawn[from].curve.pieces.extend(pieces);
+        drawn.remove(to);
+    }
+    if drawn.len() < n {
+        notes.push(format!("{n} lines on layer {layer} are joined to {} ways", drawn.len()));
+    }
+    drawn
 }
 
 /// The centre and the radius of the central island.
@@ -169,12 +210,31 @@ fn moved(curve: &Curve, by: DVec2) -> Curve {
     Curve { pieces: curve.pieces.iter().map(piece).collect() }
 }
 
+/// An error for a way that does not lead from an arm through the ring, whose outermost kerb has this radius (m), to one.
+fn check_way(reader: &Reader, way: &Curve, drawn: &Entity, outer: f64) -> Result<(), Error> {
+    let ends = [way.point_at(0.0), way.point_at(way.length())];
+    let found = if drawn.is_closed || ends[0].distance(ends[1]) <= GAP {
+        "closed".to_owned()
+    } else if let Some(end) = ends.iter().find(|end| end.length() <= outer) {
+        format!("ends {:.1} m from the ring's centre", end.length())
+    } else if way.polyline(0.05).iter().all(|p| ends[0].length().min(ends[1].length()) - NEARER < p.length()) {
+        "beside the ring".to_owned()
+    } else {
+        return Ok(());
+    };
+    let expected = format!(
+        "each way is one line from an arm through the ring to an arm, from and to more than {outer:.1} m from the \
+         ring's centre"
+    );
+    Err(reader.invalid(drawn.place.clone(), found, expected))
+}
+
 /// How far a way turns about the centre, counter-clockwise positive (rad).
 fn turn_about_centre(way: &Curve) -> f64 {
     way.polyline(0.05).windows(2).map(|pair| wrapped(pair[1].to_angle() - pair[0].to_angle())).sum()
 }
 
-/// The arms that the ends of the ways form, counter-clockwise from east in the world that is seen.
+/// The arms that the ends of the ways form, counter-clockwise as the road is driven.
 fn arms(reader: &Reader, ways: &[Curve], layers: &Layers, mirrored: bool) -> Result<Vec<Arm>, Error> {
     let ends = ways.iter().flat_map(|way| [way.point_at(0.0), way.point_at(way.length())]);
     let mut bearings: Vec<f64> = ends.map(|end| end.to_angle().rem_euclid(TAU)).collect();
@@ -200,26 +260,8 @@ fn arms(reader: &Reader, ways: &[Curve], layers: &Layers, mirrored: bool) -> Res
         })
         .collect();
     middles.sort_by(f64::total_cmp);
-    let seen = |bearing: f64| if mirrored { -bearing } else { bearing };
-    let compass = |bearing: f64| {
-        let point = (seen(bearing) / TAU * 8.0).round().rem_euclid(8.0) as usize % 8;
-        ["E", "NE", "N", "NW", "W", "SW", "S", "SE"][point].to_owned()
-    };
-    let mut names = layers.arms.clone();
-    if names.is_empty() {
-        for &bearing in &middles {
-            let name = compass(bearing);
-            let same =
-                names.iter().filter(|other| other.trim_end_matches(|c: char| c.is_ascii_digit()) == name).count();
-            names.push(if same == 0 { name } else { format!("{name}{}", same + 1) });
-        }
-    }
-    if names.len() != middles.len() {
-        let list: Vec<String> = middles.iter().map(|bearing| format!("{:.0}", bearing.to_degrees())).collect();
-        let expected = format!("the drawing has {} arms, at {} deg", middles.len(), list.join(", "));
-        return Err(reader.invalid("arms", format!("{:?}", layers.arms), expected));
-    }
-    Ok(names.into_iter().zip(middles).map(|(name, bearing)| Arm { name, bearing }).collect())
+    named(&middles, &layers.arms, mirrored)
+        .map_err(|expected| reader.invalid("arms", format!("{:?}", layers.arms), expected))
 }
 
 /// The routes along the ways.

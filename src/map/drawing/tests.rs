@@ -271,3 +271,94 @@ fn a_text_cut_anywhere_is_an_error_or_a_road_and_never_a_panic() {
         assert!(parse(Path::new("site.dxf"), wrong, &layers()).is_err(), "{wrong}");
     }
 }
+
+#[test]
+fn given_names_of_arms_go_round_from_east_as_the_road_is_seen_on_either_hand() {
+    let road = Road::named("20m").unwrap();
+    let mirrored = Road::on("m".into(), crate::map::ground::Ground { mirrored: true, ..road.ground().clone() }).seen();
+    let n = road.ground().arms.len();
+    let names: Vec<String> = (1..=n).map(|index| format!("A{index}")).collect();
+    for (drawing, hand) in [(drawn(&road, 1.0), 1.0), (drawn(&mirrored, 1.0), -1.0)] {
+        let Drawn { ground, .. } = read(&drawing, &Layers { arms: names.clone(), ..layers() }).unwrap();
+        let bearing = |name: &String| {
+            let arm = ground.arms.iter().find(|arm| arm.name == *name).unwrap();
+            (hand * arm.bearing + std::f64::consts::FRAC_PI_8).rem_euclid(std::f64::consts::TAU)
+        };
+        assert!(names.is_sorted_by(|one, other| bearing(one) < bearing(other)), "{:?}", ground.arms);
+    }
+    for wrong in [vec!["A1".to_owned(); n], vec!["B".to_owned()]] {
+        let said = read(&drawn(&road, 1.0), &Layers { arms: wrong, ..layers() }).unwrap_err();
+        assert!(said.contains("site.dxf: arms: ["), "{said}");
+    }
+}
+
+#[test]
+fn a_way_leads_from_an_arm_through_the_ring_to_an_arm_and_one_over_a_kerb_is_noted() {
+    let road = Road::named("20m").unwrap();
+    let whole = drawn(&road, 1.0);
+    let line = &road.ground().lines[0].line;
+    let outer = Curve::circle(DVec2::ZERO, road.ground().outer_radius + 20.0);
+    for (curve, is_closed, said) in [
+        (line.part(0.1, 0.5 * line.length()), false, "m from the ring's centre; each way is one line from an arm"),
+        (outer.part(0.0, 1.0), false, "beside the ring; each way"),
+        (outer.clone(), true, "closed; each way"),
+    ] {
+        let found = read(&(whole.clone() + &polyline("LANE", &curve, is_closed, 1.0)), &layers()).unwrap_err();
+        assert!(found.contains("site.dxf: line ") && found.contains(said), "{found}");
+    }
+    let dot = "0\nLINE\n8\nKERB\n10\n3030\n20\n-500\n11\n3030.01\n21\n-500\n";
+    let notes = read(&(whole.clone() + dot), &layers()).unwrap().notes;
+    assert_eq!(notes, ["1 lines on layer KERB that are shorter than 0.02 m are left out"]);
+    let across: String = road
+        .ground()
+        .faces
+        .loops
+        .iter()
+        .map(|curve| polyline("KERB", curve, true, 1.0))
+        .chain(road.ground().lines.iter().map(|line| {
+            let aside = line.line.pieces.iter().map(|piece| match *piece {
+                Piece::Segment { from, to } => Piece::Segment { from: from + DVec2::Y * 3.0, to: to + DVec2::Y * 3.0 },
+                Piece::Arc { centre, radius, from, sweep } => {
+                    Piece::Arc { centre: centre + DVec2::Y * 3.0, radius, from, sweep }
+                }
+            });
+            polyline("LANE", &Curve { pieces: aside.collect() }, false, 1.0)
+        }))
+        .collect();
+    let notes = read(&across, &layers()).unwrap().notes;
+    assert!(notes.iter().any(|note| note.starts_with("line ") && note.contains("m from a kerb at (")), "{notes:?}");
+}
+
+#[test]
+fn a_drawing_may_begin_with_a_byte_order_mark_and_names_of_layers_may_be_in_the_usual_code_page() {
+    let file = Path::new("site.dxf");
+    let text = format!("{HEADER}{}{END}", drawn(&Road::named("16m").unwrap(), 1.0));
+    assert_eq!(super::text(file, format!("\u{feff}{text}").as_bytes()), text);
+    let bytes: Vec<u8> = text.replace("KERB", "Bordüre").chars().map(|c| u8::try_from(u32::from(c)).unwrap()).collect();
+    let named = Layers { kerbs: "BORDüRE".into(), ..layers() };
+    assert!(std::str::from_utf8(&bytes).is_err() && parse(file, &super::text(file, &bytes), &named).is_ok());
+}
+
+#[test]
+fn ways_in_parts_are_joined_where_one_ends_and_one_begins() {
+    let road = Road::named("20m").unwrap();
+    let kerbs: String = road.ground().faces.loops.iter().map(|curve| polyline("KERB", curve, true, 1.0)).collect();
+    let lines: Vec<&Curve> = road.ground().lines.iter().map(|line| &line.line).collect();
+    let parts = |n: usize| -> String {
+        let of = |curve: &&Curve| -> String {
+            let length = curve.length() / n as f64;
+            // The last one first.
+            let part = |k: usize| curve.part(length * k as f64, length * (k + 1) as f64);
+            (0..n).rev().map(|k| polyline("LANE", &part(k), false, 1.0)).collect()
+        };
+        // Of each arm's ways the first ones share their way in.
+        lines.iter().step_by(5).map(of).collect()
+    };
+    let (whole, cut) = (read(&(kerbs.clone() + &parts(1)), &layers()), read(&(kerbs + &parts(3)), &layers()));
+    let (whole, cut) = (whole.unwrap(), cut.unwrap());
+    assert_eq!((cut.ground.lines.len(), cut.ground.arms.len()), (whole.ground.lines.len(), whole.ground.arms.len()));
+    assert!(cut.notes.iter().any(|note| note.contains("lines on layer LANE are joined to ")), "{:?}", cut.notes);
+    for (one, other) in cut.ground.lines.iter().zip(&whole.ground.lines) {
+        assert!((one.line.length() - other.line.length()).abs() < 1e-6);
+    }
+}

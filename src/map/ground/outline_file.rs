@@ -366,5 +366,25 @@ fn loops(
             "one loop is outer, and one or more the island",
         ));
     }
+    let outer = kerbs.iter().position(|&kerb| kerb == Kerb::Outer).unwrap_or(0);
+    let areas: Vec<Outline> = curves.iter().map(|curve| Outline::new(vec![curve.clone()])).collect();
+    for (i, curve) in curves.iter().enumerate().filter(|&(i, _)| i != outer) {
+        let start = curve.point_at(0.0);
+        let around = areas.iter().enumerate().find(|&(j, area)| j != i && area.contains(start) != (j == outer));
+        if let Some((j, _)) = around {
+            let (found, expected) = if j == outer {
+                ("outside", format!("must lie inside the outer loop, {table}[{j}]"))
+            } else {
+                ("inside another", format!("must not lie inside {table}[{j}]"))
+            };
+            return Err(reader.invalid(format!("{table}[{i}].path"), found, expected));
+        }
+    }
+    let is_island = |(i, area): (usize, &Outline)| kerbs[i] == Kerb::Island && area.contains(DVec2::ZERO);
+    if is_ring && !areas.iter().enumerate().any(is_island) {
+        let i = kerbs.iter().position(|&kerb| kerb == Kerb::Island).unwrap_or(0);
+        let expected = "an island must lie around the ring's centre, (0, 0)";
+        return Err(reader.invalid(format!("{table}[{i}].path"), "beside the centre", expected));
+    }
     Ok((Outline::new(curves), kerbs))
 }

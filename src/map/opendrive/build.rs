@@ -146,7 +146,8 @@ impl Site<'_> {
         let Site { map, refused, network, origin, extent, circle, faces, edges } = self;
         check_arms(map, refused, lanes, circle)?;
         let mirrored = map.is_mirrored();
-        let arms = named(lanes, &options.arms, mirrored)
+        let bearings: Vec<f64> = lanes.iter().map(ArmLanes::bearing).collect();
+        let arms = named(&bearings, &options.arms, mirrored)
             .map_err(|expected| refused.error("arms", format!("{:?}", options.arms), expected))?;
         let mut routes = Lines {
             network,

@@ -4,7 +4,7 @@ use roxmltree::Node;
 
 use super::records::{Cubic, Level, RoadRecord, active};
 use super::source::Source;
-use super::xml::{child, children};
+use super::xml::{attribute, child, children};
 use crate::files::reader::Error;
 
 /// A grade beyond this is warned of.
@@ -86,6 +86,18 @@ impl Source<'_, '_> {
             .map(|(record, from, to)| record.largest(from, to))
             .fold(0.0, f64::max);
         let Some(profile) = child(node, "lateralProfile") else { return Ok(0.0) };
+        // Of OpenDRIVE 1.4 and 1.5, for either side or both.
+        let mut fall: f64 = 0.0;
+        for side in ["left", "right", "both"] {
+            let of_side = children(profile, "crossfall").filter(|record| {
+                let given = attribute(*record, "side");
+                if given.is_empty() { side == "both" } else { given == side }
+            });
+            let records = self.cubics(of_side, "s")?;
+            fall = stretches(&records, road.length)
+                .map(|(record, from, to)| record.largest(from, to))
+                .fold(fall, f64::max);
+        }
         if child(profile, "crossSectionSurface").is_some() {
             self.warn(node, "its crossSectionSurface is not read; the simulated road is level");
         }
@@ -108,7 +120,7 @@ impl Source<'_, '_> {
                 steepest = steepest.max(if from < to { shape.steepest(from, to) } else { 0.0 });
             }
         }
-        Ok(angle.min(1.5).tan() + steepest)
+        Ok(angle.min(1.5).tan() + fall.min(1.5).tan() + steepest)
     }
 
     /// Cubics of an element's children in the order of their beginnings.

@@ -74,7 +74,7 @@ impl Lines<'_> {
     /// Warns of routes too near to a kerb.
     pub(super) fn check(&mut self, faces: &Outline) {
         for line in &self.lines {
-            if let Some((distance, p)) = closest(&line.line, faces).filter(|(distance, _)| *distance < NEAREST) {
+            if let Some((distance, p)) = closest(&line.line, faces) {
                 let (place, route) = (self.place, self.name(line.entry, line.lane, line.exit));
                 let y = if self.mirrored { -p.y } else { p.y };
                 let at = format!("({:.1}, {y:.1}) from the centre", p.x);
@@ -97,11 +97,12 @@ fn width(network: &Network, way: &[usize], p: DVec2) -> f64 {
     nearest.map_or(3.5, |((left, right), _)| left.distance(*right))
 }
 
-/// The least distance of a line from the kerbs, away from its ends, and where (m).
-fn closest(line: &Curve, faces: &Outline) -> Option<(f64, DVec2)> {
+/// Where a line comes too near to a kerb, away from its ends, and how near it is there (m).
+pub(in crate::map) fn closest(line: &Curve, faces: &Outline) -> Option<(f64, DVec2)> {
     let n = (line.length() - 2.0 * NEAREST) as usize;
     let at = |i: usize| line.point_at(2.0 * NEAREST + i as f64 * 0.98);
-    (0..n).map(|i| (faces.signed_distance(at(i)), at(i))).min_by(|one, other| one.0.total_cmp(&other.0))
+    let all = (0..n).map(|i| (faces.signed_distance(at(i)), at(i)));
+    all.min_by(|one, other| one.0.total_cmp(&other.0)).filter(|(distance, _)| *distance < NEAREST)
 }
 
 /// The centre lines of routes, each lane once.

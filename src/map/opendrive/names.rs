@@ -2,20 +2,19 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::crossings::ArmLanes;
 use crate::map::ground::Arm;
 
-/// The arms with their names, or what is wrong with those that are given, in the map's order; none is given where they
-/// are to be found.
-pub(super) fn named(lanes: &[ArmLanes], given: &[String], mirrored: bool) -> Result<Vec<Arm>, String> {
-    let bearings: Vec<f64> = lanes.iter().map(|arm| arm.bearing().rem_euclid(TAU)).collect();
+/// The arms at these bearings (rad) with their names, or what is wrong with those that are given, which follow each other
+/// counter-clockwise from east as the road is seen; none is given where they are to be found.
+pub(in crate::map) fn named(bearings: &[f64], given: &[String], mirrored: bool) -> Result<Vec<Arm>, String> {
+    let bearings: Vec<f64> = bearings.iter().map(|bearing| bearing.rem_euclid(TAU)).collect();
     // In the mirror image of a map its arms follow each other clockwise.
     let in_map = |bearing: f64| if mirrored { (-bearing).rem_euclid(TAU) } else { bearing };
-    let mut order: Vec<usize> = (0..lanes.len()).collect();
+    let mut order: Vec<usize> = (0..bearings.len()).collect();
     let from_east = |&arm: &usize| (in_map(bearings[arm]) + PI / 8.0).rem_euclid(TAU);
     order.sort_by(|one, other| from_east(one).total_cmp(&from_east(other)));
     let mut names = given.to_vec();
-    if given.len() == lanes.len() {
+    if given.len() == bearings.len() {
         order.iter().zip(given).for_each(|(&arm, name)| names[arm].clone_from(name));
     }
     if names.is_empty() {
@@ -27,10 +26,10 @@ pub(super) fn named(lanes: &[ArmLanes], given: &[String], mirrored: bool) -> Res
             names.push(if same == 0 { name.to_owned() } else { format!("{name}{}", same + 1) });
         }
     }
-    if names.len() != lanes.len() {
+    if names.len() != bearings.len() {
         return Err(format!(
             "the ring has {} arms, at {} deg",
-            lanes.len(),
+            bearings.len(),
             order
                 .iter()
                 .map(|&arm| (in_map(bearings[arm]).to_degrees().round() % 360.0).to_string())

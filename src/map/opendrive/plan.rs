@@ -74,11 +74,18 @@ impl Source<'_, '_> {
             Some(("arc", form)) => Shape::Arc(curvature(form, "curvature")?),
             Some(("spiral", form)) => Shape::Spiral(curvature(form, "curvStart")?, curvature(form, "curvEnd")?),
             Some(("poly3", form)) => Shape::Poly3(self.factors(form, ["a", "b", "c", "d"])?),
-            Some(("paramPoly3", form)) => Shape::ParamPoly3 {
-                u: self.factors(form, ["aU", "bU", "cU", "dU"])?,
-                v: self.factors(form, ["aV", "bV", "cV", "dV"])?,
-                normalised: attribute(form, "pRange") != "arcLength",
-            },
+            Some(("paramPoly3", form)) => {
+                let range = attribute(form, "pRange");
+                if !["", "normalized", "arcLength"].contains(&range) {
+                    let expected = "must be \"arcLength\" or \"normalized\"";
+                    return Err(self.invalid(form, "pRange", &format!("{range:?}"), expected));
+                }
+                Shape::ParamPoly3 {
+                    u: self.factors(form, ["aU", "bU", "cU", "dU"])?,
+                    v: self.factors(form, ["aV", "bV", "cV", "dV"])?,
+                    normalised: range != "arcLength",
+                }
+            }
             other => {
                 let found = other.map_or("missing".to_owned(), |(name, _)| format!("<{}>", shown(name)));
                 return Err(self.invalid(node, "form", &found, "must be line, arc, spiral, poly3 or paramPoly3"));

@@ -60,7 +60,11 @@ pub(super) fn records(file: &Path, text: &str, hand: Hand) -> Result<Records, Er
     }
     for node in children(root, "junction") {
         let connections = source.junction(node)?;
-        source.records.junctions.entry(attribute(node, "id").to_owned()).or_insert(connections);
+        let id = attribute(node, "id");
+        if source.records.junctions.contains_key(id) {
+            source.warn(node, "has the id of an earlier junction; its connections count as that one's");
+        }
+        source.records.junctions.entry(id.to_owned()).or_default().extend(connections);
     }
     source.records.mirrored = match hand {
         Hand::Right => false,
@@ -68,8 +72,17 @@ pub(super) fn records(file: &Path, text: &str, hand: Hand) -> Result<Records, Er
         Hand::Map => source.left_hand(root),
     };
     let offset = child(root, "header").and_then(|header| child(header, "offset"));
-    let offset = offset.map(|offset| ["x", "y", "z", "hdg"].map(|key| attribute(offset, key).parse().unwrap_or(0.0)));
-    source.records.offset = offset.filter(|offset| *offset != [0.0; 4]);
+    if let Some(node) = offset {
+        let mut offset = [0.0; 4];
+        for (value, key) in offset.iter_mut().zip(["x", "y", "z", "hdg"]) {
+            match attribute(node, key).trim().parse::<f64>() {
+                Ok(given) if given.is_finite() => *value = given,
+                _ if attribute(node, key).is_empty() => {}
+                _ => source.warn(node, &format!("its {key} is no number, and counts as 0")),
+            }
+        }
+        source.records.offset = (offset != [0.0; 4]).then_some(offset);
+    }
     let signals = root.descendants().filter(|node| node.has_tag_name("signal")).count();
     if 0 < signals {
         source.records.warnings.push(format!("{signals} signals are not read"));

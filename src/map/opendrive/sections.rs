@@ -85,7 +85,7 @@ impl Source<'_, '_> {
     fn lane(&mut self, node: Node) -> Result<Lane, Error> {
         let id = attribute(node, "id").parse::<i32>().ok().filter(|id| (-1000..=1000).contains(id) && *id != 0);
         let id = id.ok_or_else(|| {
-            self.invalid(node, "id", &format!("{:?}", attribute(node, "id")), "must be a number in -1000..1000")
+            self.invalid(node, "id", &format!("{:?}", attribute(node, "id")), "must be a number in -1000..1000, not 0")
         })?;
         let widths = self.cubics(children(node, "width"), "sOffset")?;
         let borders = self.cubics(children(node, "border"), "sOffset")?;

@@ -58,7 +58,13 @@ pub(super) fn as_written(error: Error) -> Error {
 
 /// A key or a message in which each lane has the name of the other side: a direction, as in "left of", stays.
 fn lanes_swapped(message: &str) -> String {
-    let pairs = [("entry.left", "entry.right"), ("exit.left", "exit.right"), ("left lane", "right lane")];
+    let pairs = [
+        ("entry.left", "entry.right"),
+        ("exit.left", "exit.right"),
+        ("left lane", "right lane"),
+        ("`left`", "`right`"),
+        ("counter-clockwise", "clockwise"),
+    ];
     pairs.iter().fold(message.to_owned(), |message, (left, right)| {
         let parts: Vec<String> = message.split(left).map(|part| part.replace(right, left)).collect();
         parts.join(right)
@@ -75,5 +81,8 @@ mod tests {
         let swapped = "4 m left of entry.right, right of exit.left: right lanes, the left lane's, to the left";
         assert_eq!(lanes_swapped(message), swapped);
         assert_eq!(lanes_swapped(swapped), message);
+        let message = "one lane, which is `right`: leave `left` out; arms follow each other counter-clockwise";
+        let swapped = "one lane, which is `left`: leave `right` out; arms follow each other clockwise";
+        assert_eq!((lanes_swapped(message).as_str(), lanes_swapped(swapped).as_str()), (swapped, message));
     }
 }

@@ -6,7 +6,7 @@ use super::{Fleet, Member, N_VEHICLES, Ranges};
 use crate::files::reader::{Error, Reader};
 use crate::files::shipped::{Kind, Source};
 use crate::scenario::benchmark_keys::{Written, WrittenDraw, WrittenMember, WrittenVehicles};
-use crate::scenario::check::check_vehicle;
+use crate::scenario::check::{Invalid, check_vehicle, within};
 use crate::scenario::referred::referred;
 use crate::vehicle::{Vehicle, read_model};
 
@@ -133,10 +133,28 @@ fn drawn(reader: &Reader, members: Vec<Member>, written: &WrittenDraw) -> Result
         return Err(reader.invalid("draw.n_vehicles", value, expected));
     }
     for (member, vehicle) in fleet.extremes() {
-        check_vehicle(&vehicle).map_err(|wrong| {
+        check_vehicle(&vehicle).and_then(|()| check_drawn(&vehicle)).map_err(|wrong| {
             let expected = format!("of {} with all ranges at their ends: {}", member.name, wrong.expected);
             reader.invalid("draw", format_args!("{}: {}", wrong.key, wrong.value), expected)
         })?;
     }
     Ok(fleet)
+}
+
+/// What a vehicle's file must keep to between its values holds for what is drawn, too.
+fn check_drawn(vehicle: &Vehicle) -> Result<(), Invalid> {
+    let (tractor, trailer) = (&vehicle.tractor, &vehicle.trailer);
+    // As of a file: nearer to the drive axle than the trailer's axles are to the kingpin.
+    let nearer = trailer.wheelbase - 0.01;
+    within("tractor.wheelbase", tractor.wheelbase, [2.0, 13.0])?;
+    within("trailer.wheelbase", trailer.wheelbase, [2.5, 23.0])?;
+    within("model.slip_lever", vehicle.model.slip_lever, [0.0, trailer.wheelbase - 1.0])?;
+    within("tractor.fifth_wheel", tractor.fifth_wheel, [-nearer, nearer])?;
+    let loads = vehicle.loads.iter().map(|(name, load)| (format!("loads.{name}"), &load.suspension));
+    let units = std::iter::once(("tractor".to_owned(), &tractor.suspension)).chain(loads);
+    for (unit, suspension) in units {
+        let key = format!("{unit}.suspension.centre_of_gravity");
+        within(&key, suspension.centre_of_gravity, [suspension.roll_centre.max(0.2), 6.0])?;
+    }
+    Ok(())
 }

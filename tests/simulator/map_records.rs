@@ -1,0 +1,102 @@
+//! Records of maps and outlines that are easily misread: doubled junctions, crossfall of old versions, ranges of
+//! parameters, offsets; loops beside the road.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use offtrack::files::cache::Loading;
+use offtrack::map::Road;
+use offtrack::map::opendrive::{Hand, Map};
+use offtrack::scenario::Scenario;
+
+use crate::map_kinds::{file, imported, parsed, plain};
+
+fn scenarios() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios")
+}
+
+fn warnings(text: &str) -> String {
+    parsed(text).warnings().collect::<Vec<_>>().join("\n")
+}
+
+#[test]
+fn connections_of_a_junction_that_is_written_twice_count_together() {
+    let text = plain();
+    let (begin, end) = (text.find("<junction ").unwrap(), text.find("</junction>").unwrap());
+    let head = text[begin..].split_inclusive('>').next().unwrap();
+    let second = begin + head.len() + text[begin + head.len()..end].find("</connection>").unwrap() + 13;
+    let split = format!("{}</junction>{head}{}", &text[..second], &text[second..]);
+    assert_eq!(imported(&parsed(&split)).ground.lines.len(), imported(&parsed(&text)).ground.lines.len());
+    assert!(warnings(&split).contains("has the id of an earlier junction; its connections count as that one's"));
+}
+
+#[test]
+fn the_crossfall_of_old_versions_is_warned_of_on_either_side() {
+    for side in ["left", "right", "both"] {
+        let profile = format!(
+            "</planView><lateralProfile><crossfall side=\"{side}\" s=\"0\" a=\"0.0996687\" b=\"0\" c=\"0\" d=\"0\"/>\
+             </lateralProfile>"
+        );
+        let said = warnings(&plain().replacen("</planView>", &profile, 1));
+        assert!(said.contains("crossfall (superelevation, crossfall, shape), up to 10.0 % on road "), "{said}");
+    }
+}
+
+#[test]
+fn a_range_that_is_none_is_refused_and_an_offset_that_is_no_number_counts_as_0_with_a_warning() {
+    let spline = |range: &str| {
+        let form = format!(
+            "<paramPoly3 aU=\"0\" bU=\"1\" cU=\"0\" dU=\"0\" aV=\"0\" bV=\"0\" cV=\"0\" dV=\"0\" pRange=\"{range}\"/>"
+        );
+        plain().replacen("<line/>", &form, 1)
+    };
+    assert!(plain().contains("<line/>"));
+    assert!(warnings(&spline("arcLength")).is_empty());
+    let said = Map::parse(Path::new("ring.xodr"), &spline("arclength"), Hand::Map).unwrap_err().to_string();
+    assert!(said.contains("paramPoly3: pRange: \"arclength\"; must be \"arcLength\" or \"normalized\""), "{said}");
+    let header = |offset: &str| {
+        let text = plain();
+        let at = text.find("</header>").expect("the map has a header with children");
+        format!("{}<offset {offset}/>{}", &text[..at], &text[at..])
+    };
+    let said = warnings(&header("x=\"500,5\" y=\"0\" z=\"0\" hdg=\"0\""));
+    assert!(said.contains("its x is no number, and counts as 0"), "{said}");
+}
+
+#[test]
+fn loops_of_an_outline_lie_inside_the_outer_one_and_in_no_other_and_an_island_around_the_centre() {
+    let text = imported(&parsed(&plain())).ground.text(&[]);
+    let square = |x: f64, side: f64| {
+        let corners = [(-side, -side), (side, -side), (side, side), (-side, side)];
+        let points = corners.map(|(dx, dy)| format!("[{}, {dy}]", x + dx));
+        format!("[[face]]\nof = \"E\"\npath = [{}]\n\n", points.join(", "))
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let read = |text: &str| {
+        let file = folder.path().join("ring.outline.toml");
+        fs::write(&file, text).unwrap();
+        Road::read(&file).map(|_| ()).map_err(|error| error.to_string())
+    };
+    let (before, after) = text.split_at(text.find("[[route]]").unwrap());
+    let with = |more: &str| read(&format!("{before}{more}{after}"));
+    for (loop_, said) in [
+        (square(900.0, 1.0), "outside; must lie inside the outer loop, face["),
+        (square(0.0, 1.0), "inside another; must not lie inside face["),
+    ] {
+        let found = with(&loop_).unwrap_err();
+        assert!(found.contains("ring.outline.toml: face[") && found.contains(said), "{found}");
+    }
+    assert_eq!(read(&text), Ok(()));
+}
+
+#[test]
+fn a_ring_that_is_nowhere_is_refused_by_its_key() {
+    let map = file("plain_ring.xodr");
+    let text = fs::read_to_string(scenarios().join("attard2023.toml")).unwrap();
+    let head = text.split("[[roundabout]]").next().unwrap().replace("vehicles/", "");
+    let vehicle = scenarios().join("vehicles");
+    let head = head.replace("vehicle = \"", &format!("vehicle = \"{}/", vehicle.display()));
+    let text = format!("{head}[[roundabout]]\nfile = {map:?}\nring = [nan, 0.0]\ntest = \"all\"\n");
+    let said = Scenario::parse("mine", &text, None, &Loading::PLAIN).unwrap_err().to_string();
+    assert!(said.contains("roundabout[0].ring[0]: NaN"), "{said}");
+}
