@@ -46,6 +46,10 @@ pub struct Counts {
     pub served: u64,
     /// Those of them that stood in a blocked ring for two minutes, and were taken away.
     pub removed: u64,
+    /// Vehicles that found room to begin.
+    pub begun: u64,
+    /// Large ones of these.
+    pub large: u64,
     /// Ring cars that passed the arm's entry.
     pub circulating: u64,
     /// Sum of the control delays of cars that came up to speed behind the line (s).
@@ -67,6 +71,8 @@ impl Counts {
         self.stayed += other.stayed;
         self.served += other.served;
         self.removed += other.removed;
+        self.begun += other.begun;
+        self.large += other.large;
         self.circulating += other.circulating;
         self.delay += other.delay;
         self.delayed += other.delayed;
@@ -91,6 +97,11 @@ impl Counts {
         of_all.map(|of_all| of_all.max(self.mean_delay().unwrap_or(0.0)))
     }
 
+    /// Fraction of large vehicles among those that came; where they do not fit it is less than was asked for.
+    pub fn heavy(&self) -> f64 {
+        self.large as f64 / self.begun.max(1) as f64
+    }
+
     /// Whether more came than the lane could serve.
     pub fn is_over_capacity(&self) -> bool {
         LOST_OVER_CAPACITY * (self.came as f64) < self.stayed as f64
@@ -105,6 +116,11 @@ impl Counts {
             0.95 * all as f64 <= below as f64
         });
         reached.unwrap_or(0)
+    }
+
+    fn add_unfinished(&mut self, steps: u32) {
+        self.unfinished += 1;
+        self.delay_so_far += f64::from(STEP) * f64::from(steps);
     }
 
     fn note_queue(&mut self, n: usize) {
@@ -222,7 +238,7 @@ impl<'a> Observer<'a> {
 
     fn observe(&mut self, run: &Run, before: &[Car], events: &[Event], step: u32) {
         let counts = WARM_UP <= step;
-        // Cars that left or came in this step have passed nothing else in it.
+        // Cars that came in this step have passed nothing in it.
         let mut changed = [false; MOST_CARS];
         for &event in events {
             match event {
@@ -241,12 +257,28 @@ impl<'a> Observer<'a> {
                     let unhindered = Car { speed: limit << FINER_SPEED, ..car };
                     let free = *self.free.entry(car.what).or_insert_with(|| self.survey.free_time(unhindered));
                     self.known[slot] = self.outside[source].pop_front().map(|came| Known { came, free });
+                    self.counts[source].begun += u64::from(counts);
+                    self.counts[source].large += u64::from(counts && car.is_large());
                 }
-                Event::Left(slot) => changed[slot] = true,
+                Event::Left(slot) => {
+                    changed[slot] = true;
+                    if counts {
+                        // The line of a path that meets no other arm's is at its end.
+                        let end = self.survey.network.paths[before[slot].path()].length;
+                        self.count_passed(slot, &before[slot], end + 1, step);
+                    }
+                }
                 Event::Removed(slot) => {
                     changed[slot] = true;
-                    let source = self.survey.network.paths[before[slot].path()].source as usize;
-                    self.counts[source].removed += u64::from(counts);
+                    let (path, front) = (before[slot].path(), before[slot].front());
+                    let of = &mut self.counts[self.survey.network.paths[path].source as usize];
+                    of.removed += u64::from(counts);
+                    if let Some(Known { came, free }) = self.known[slot]
+                        && counts
+                        && front <= self.survey.end_of_entry(path)
+                    {
+                        of.add_unfinished((step - came).saturating_sub(free));
+                    }
                 }
             }
         }
@@ -257,30 +289,34 @@ impl<'a> Observer<'a> {
         for (slot, car) in run.cars.iter().enumerate().filter(|(slot, car)| car.is_there() && !changed[*slot]) {
             let network = self.survey.network;
             let path = &network.paths[car.path()];
-            let passed = |station: i32| before[slot].front() <= station && station < car.front();
-            let own = path.source as usize;
-            self.counts[own].served += u64::from(passed(path.line));
-            queued[own] += usize::from(car.front() <= path.line && car.pace() < QUEUED);
-            for (source, of) in network.sources.iter().enumerate() {
-                let at = self.survey.passes[car.path() * network.n_arms + of.entry as usize];
-                self.counts[source].circulating += u64::from(passed(at));
-            }
-            if passed(self.survey.end_of_entry(car.path()))
-                && let Some(Known { came, free }) = self.known[slot]
-            {
-                self.counts[own].delayed += 1;
-                self.counts[own].delay += f64::from(STEP) * (f64::from(step) - f64::from(came) - f64::from(free));
-            }
+            queued[path.source as usize] += usize::from(car.front() <= path.line && car.pace() < QUEUED);
+            self.count_passed(slot, &before[slot], car.front(), step);
         }
         self.counts.iter_mut().zip(queued).for_each(|(counts, n)| counts.note_queue(n));
     }
 
+    /// Counts what a car has passed that drove on from where it was to a station (2^-10 m).
+    fn count_passed(&mut self, slot: usize, before: &Car, to: i32, step: u32) {
+        let network = self.survey.network;
+        let passed = |station: i32| before.front() <= station && station < to;
+        let path = &network.paths[before.path()];
+        let own = path.source as usize;
+        self.counts[own].served += u64::from(passed(path.line));
+        for (source, of) in network.sources.iter().enumerate() {
+            let at = self.survey.passes[before.path() * network.n_arms + of.entry as usize];
+            self.counts[source].circulating += u64::from(passed(at));
+        }
+        if passed(self.survey.end_of_entry(before.path()))
+            && let Some(Known { came, free }) = self.known[slot]
+        {
+            self.counts[own].delayed += 1;
+            self.counts[own].delay += f64::from(STEP) * (f64::from(step) - f64::from(came) - f64::from(free));
+        }
+    }
+
     /// Counts who waits outside or is on an entry after the last step, `end`.
     fn count_unfinished(&mut self, run: &Run, end: u32) {
-        let mut add = |source: usize, steps: u32| {
-            self.counts[source].unfinished += 1;
-            self.counts[source].delay_so_far += f64::from(STEP) * f64::from(steps);
-        };
+        let mut add = |source: usize, steps: u32| self.counts[source].add_unfinished(steps);
         for (source, outside) in self.outside.iter().enumerate() {
             outside.iter().for_each(|came| add(source, end - came));
         }

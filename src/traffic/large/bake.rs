@@ -109,8 +109,13 @@ impl Network {
         };
         for class in 0..N_CLASSES {
             let of = |a: usize| self.line_of_class(a, (0..N_CLASSES).map(|other| &met[class * N_CLASSES + other]));
-            tables.lines.extend((0..n).map(of));
-            tables.fits.extend(fits[class * n..][..n].iter().map(|&fits| u32::from(fits)));
+            let lines: Vec<[i32; 2]> = (0..n).map(of).collect();
+            // One that is longer than the way to its line would begin beyond that.
+            let longest = Large::ALL.iter().filter(|kind| kind.class() == class).map(|kind| kind.extent()).max();
+            let has_room = |path: usize| class == 0 || longest.unwrap_or(0) <= lines[path][0];
+            let fits = fits[class * n..][..n].iter().enumerate();
+            tables.fits.extend(fits.map(|(path, &fits)| u32::from(fits && has_room(path))));
+            tables.lines.extend(lines);
         }
         for (path, driven) in self.paths.iter().zip(&driven) {
             for k in 0..path.n as usize {

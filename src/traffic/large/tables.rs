@@ -150,7 +150,8 @@ impl Network {
         self.large.as_ref().map_or([line, clear], of)
     }
 
-    /// Whether a large vehicle, or a car, can take a path without the lanes of those who come the other way.
+    /// Whether a large vehicle, or a car, can take a path without the lanes of those who come the other way, and
+    /// begins before its line.
     pub(in crate::traffic) fn fits(&self, car: &Car) -> bool {
         let index = car.class() * self.paths.len() + car.path();
         self.large.as_ref().is_none_or(|large| large.fits[index] == 1)

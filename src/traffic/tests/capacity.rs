@@ -1,9 +1,14 @@
 //! Entries have the capacities of the Highway Capacity Manual.
 
+use std::path::Path;
+
 use super::{baked, map};
 use crate::layout::Stream;
+use crate::map::Road;
+use crate::map::chosen::Choice;
+use crate::map::opendrive::{RoadLane, Way};
 use crate::traffic::hcm::Lane;
-use crate::traffic::{Mix, Network, Rules, Survey};
+use crate::traffic::{Demand, Mix, Network, Rules, Survey};
 
 /// Steps of each of the runs at a point: 13 minutes.
 const STEPS: u32 = 7_800;
@@ -74,4 +79,21 @@ fn capacities_of_one_lane_into_one_are_the_manuals_within_15_percent_and_not_wit
     let sleepy = Rules { headway: 2 * Rules::FITTED.headway, ..Rules::FITTED };
     let largest = largest_deviation(&network, &sleepy, lane, &[0.0]);
     assert!(0.15 < largest, "{largest}");
+}
+
+#[test]
+fn cars_on_a_path_that_meets_no_other_arms_are_counted_where_they_leave() {
+    let lane = |road: &str, lane| RoadLane { road: road.into(), lane };
+    let ways = [Way { from: lane("90", 1), to: lane("34", -1) }].into();
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/maps/Town03.xodr");
+    let road = Road::from_map(&file, &Choice { ways, ..Choice::default() }).unwrap();
+    let (network, rules) = (Network::bake(&road).unwrap(), Rules::FITTED);
+    assert_eq!(network.paths[0].line, network.paths[0].length);
+    let survey = Survey::new(&network, &rules).unwrap();
+    let demand = Demand::new(&network, &[400.0], Mix::default()).unwrap();
+    let counts = &survey.counted(&demand, 18_000, Stream { seed: 3, env: 0 }, &[])[0];
+    // All but those under way at both ends.
+    assert!(150 < counts.came && counts.came.abs_diff(counts.served) < 8, "{counts:?}");
+    assert_eq!((counts.delayed, counts.circulating), (counts.served, 0));
+    assert!(counts.mean_delay().unwrap() < 1.5, "{counts:?}");
 }

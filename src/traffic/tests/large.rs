@@ -4,6 +4,7 @@ use glam::Vec2;
 
 use super::{baked, map};
 use crate::layout::Stream;
+use crate::map::ground::{Ground, Line};
 use crate::map::{Road, procedural};
 use crate::traffic::car::Outline;
 use crate::traffic::{Car, Demand, Event, Large, Mix, Network, Rules, Run};
@@ -239,4 +240,19 @@ fn a_network_without_large_vehicles_is_that_of_cars_and_their_words_read_back() 
     let mut changed = words.clone();
     changed[0] -= 2;
     assert_eq!(Network::parsed(&changed), None);
+}
+
+#[test]
+fn a_vehicle_that_is_longer_than_the_way_to_its_line_does_not_come() {
+    let road = Road::named("20m").unwrap();
+    let shorter = |line: &Line| {
+        let (from, to) = (line.line.point_at(0.0).length() - road.ground().outer_radius, line.line.length());
+        Line { line: line.line.part((from - 14.0).max(0.0), to), ..line.clone() }
+    };
+    let lines = road.ground().lines.iter().map(shorter).collect();
+    let short = Road::on("short".into(), Ground { lines, ..road.ground().clone() });
+    let (whole, cut) = (with_large(&road), with_large(&short));
+    let comes = |network: &Network, kind| (0..network.paths.len()).any(|path| network.fits(&at(path, 0.0, kind)));
+    assert!(Large::ALL.into_iter().all(|kind| comes(&whole, kind)));
+    assert!(!Large::ALL.into_iter().any(|kind| comes(&cut, kind)));
 }
