@@ -41,8 +41,8 @@ pub struct Args {
     /// Which routes: `test` (unseen in training), `validation` or `train`.
     #[arg(long, default_value = "test", value_parser = ["test", "validation", "train"])]
     split: String,
-    /// Only this route of the split, 20m/N-left-3, or all of a roundabout's, 20m; repeatable. A random road need not be
-    /// in the benchmark: wide/7/12/N-left-3, or all of wide/7/12.
+    /// Only this route of the split, 20m/N-left-4, or all of a roundabout's, 20m; repeatable. A random road need not be
+    /// in the benchmark: wide/7/12/S-left-3, or all of wide/7/12.
     #[arg(long)]
     route: Vec<String>,
     /// Only trucks with this load, where the benchmark has several.
@@ -216,6 +216,7 @@ fn write_films(folder: &Path, evaluation: &Evaluation, report: &Report, sequence
     let causes = &report.failures[..report.failures.len().min(FILMS)];
     let indices: Vec<usize> = causes.iter().map(|cause| cause.example.index).collect();
     let &Evaluation { scenario, world, seed, .. } = evaluation;
+    remove_films(folder)?;
     for (n, (cause, track)) in causes.iter().zip(evaluation.repeated(sequences, &indices)?).enumerate() {
         let Example { route: name, episode, .. } = &cause.example;
         let (place, route) =
@@ -224,6 +225,18 @@ fn write_films(folder: &Path, evaluation: &Evaluation, report: &Report, sequence
             Of { scenario, world, roundabout: &scenario.places[place].roundabout, route, policy: &report.policy, seed };
         let file = folder.join(format!("{}-{}.gif", n + 1, cause.cause.replace(' ', "-")));
         record::write_film(&of, &file, *episode, evaluation.episodes, track)?;
+    }
+    Ok(())
+}
+
+/// Removes the films of an evaluation before, which would stand among the new ones.
+fn remove_films(folder: &Path) -> Result<(), Error> {
+    let is_film = |name: &str| (1..=FILMS).any(|n| name.starts_with(&format!("{n}-"))) && name.ends_with(".gif");
+    for entry in std::fs::read_dir(folder).map_err(Error::read(folder))? {
+        let file = entry.map_err(Error::read(folder))?.path();
+        if file.file_name().is_some_and(|name| is_film(&name.to_string_lossy())) {
+            std::fs::remove_file(&file).map_err(Error::write(&file))?;
+        }
     }
     Ok(())
 }

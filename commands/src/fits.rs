@@ -111,12 +111,13 @@ pub fn run(args: &Args) -> Result<bool, Error> {
     vehicles.iter().for_each(|(name, vehicle)| results.add_vehicle(name, vehicle));
     std::fs::create_dir_all(&args.output).map_err(Error::write(&args.output))?;
     let file = args.output.join("fits.json");
+    check_files(args, &file, &roads, &vehicles)?;
     results.continue_from(&file)?;
     results.write(&file)?;
     let n_rows = wanted_rows(&roads, &args.route) * vehicles.len();
     let bar = Bar::new("answering", "routes and vehicles", n_rows);
     let work = Work { args, asked: &asked, vehicles: &vehicles, file, bar };
-    let mut order = Vec::new();
+    let mut order: Vec<(String, String)> = Vec::new();
     for road in &roads {
         order.extend(work.road(road, &mut results)?);
     }
@@ -125,8 +126,10 @@ pub fn run(args: &Args) -> Result<bool, Error> {
     results.rows.sort_by_key(|row| order.iter().position(|key| *key == (row.route.clone(), row.vehicle.clone())));
     results.write(&file)?;
     files::write_whole(&args.output.join("fits.csv"), csv(&results.rows).as_bytes())?;
-    let shown: Vec<Row> = order.iter().filter_map(|(route, vehicle)| results.row(route, vehicle).cloned()).collect();
+    let mut shown: Vec<Row> =
+        order.iter().filter_map(|(route, vehicle)| results.row(route, vehicle).cloned()).collect();
     files::write_whole(&args.output.join("verdicts.csv"), verdicts(&shown).as_bytes())?;
+    shown.retain(|row| case::is_asked(&row.route, &args.route));
     let units = args.units();
     let fit = shown.iter().filter(|row| row.fits).count();
     files::print(&format!(
@@ -153,8 +156,8 @@ struct Work<'a> {
 }
 
 impl Work<'_> {
-    /// Answers what is not answered yet of a road and writes its sheets; gives route and vehicle of every row asked
-    /// for, in order.
+    /// Answers what is not answered yet of a road and writes its sheets; gives route and vehicle of every row of it, also
+    /// of those that a call before has asked for, in order.
     fn road(&self, road: &Road, results: &mut Results) -> Result<Vec<(String, String)>, Error> {
         // Sheets of all its routes, from a call before, stay.
         if wanted_rows(std::slice::from_ref(road), &self.args.route) == 0 {
@@ -167,10 +170,10 @@ impl Work<'_> {
             let routes = case::wanted(&case.routes, &self.args.route);
             self.bar.say(&format!("{name} on {}", road.name));
             self.answer(&case, &routes, results)?;
-            cases.push((case, routes));
+            cases.push(case);
         }
         let seen = road.seen();
-        let answered = cases.iter().flat_map(|(case, routes)| routes.iter().map(move |&route| (case, route)));
+        let answered = cases.iter().flat_map(|case| (0..case.routes.len()).map(move |route| (case, route)));
         let answered: Vec<(&Case, usize, Row)> = answered
             .filter_map(|(case, route)| {
                 Some((case, route, results.row(&case.routes[route].name, &case.vehicle)?.clone()))
@@ -248,6 +251,21 @@ impl Work<'_> {
         }
         Ok(())
     }
+}
+
+/// An error where the folder has no results yet, and a file of another origin would be replaced.
+fn check_files(args: &Args, results: &Path, roads: &[Road], vehicles: &[(String, Vehicle)]) -> Result<(), Error> {
+    if results.exists() {
+        return Ok(());
+    }
+    let sheets = roads.iter().flat_map(|road| ["svg", "pdf"].map(|extension| format!("{}.{extension}", stem(road))));
+    let both = roads.iter().flat_map(|road| vehicles.iter().map(move |(name, _)| of_both(road, name)));
+    let drawings = both.flat_map(|name| ["dxf", "geojson"].map(|extension| format!("{name}.{extension}")));
+    let tables = ["fits.csv", "verdicts.csv"].map(str::to_owned);
+    let mut all = sheets.chain(drawings).chain(tables).map(|name| args.output.join(name));
+    let Some(file) = all.find(|file| file.exists()) else { return Ok(()) };
+    let expected = "is there already, and no results of this command beside it: name another folder";
+    Err(Error::Setting { name: "--output", value: file.display().to_string(), expected: expected.into() })
 }
 
 /// A road's name as that of a file.

@@ -18,7 +18,8 @@ pub fn of_run(folder: &Path) -> [PathBuf; 3] {
 const DEPTH: usize = 3;
 
 /// An error if two of the files to be written are one, or one of them is a file that is read, or one that such a file
-/// names: a vehicle of a benchmark. The second would replace the first.
+/// names: a vehicle of a benchmark, which the second would replace; or if one is in a folder that there is not, so that
+/// what was computed for it would be lost.
 pub fn distinct(written: &[Named], read: &[Named]) -> Result<(), Error> {
     let mut named = Vec::new();
     for (flag, file) in read {
@@ -35,6 +36,10 @@ pub fn distinct(written: &[Named], read: &[Named]) -> Result<(), Error> {
         if let Some(found) = found {
             let expected = format!("{found}: name another one");
             return Err(Error::Setting { name: flag, value: file.display().to_string(), expected });
+        }
+        let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.exists());
+        if folder.is_some() {
+            return Err(Error::write(file)(std::io::ErrorKind::NotFound.into()));
         }
     }
     Ok(())

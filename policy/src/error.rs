@@ -22,8 +22,22 @@ pub enum Error {
         /// What is wrong and what would do.
         message: String,
     },
+    /// None of the policies that come with the program can drive in a benchmark.
+    #[error(
+        "policy: missing; none that comes with the program has the actions and extras of {}: give a policy file, \
+         NAME.safetensors, or pursuit or random",
+        shortened(benchmark, LONGEST_PATH)
+    )]
+    NoneFits {
+        /// The benchmark.
+        benchmark: String,
+    },
     /// No policy of this name comes with the program.
-    #[error("policy: {}; the program comes with {}", shortened(name, LONGEST_PATH), known.join(", "))]
+    #[error(
+        "policy: {}; the program comes with {}; a policy file ends in .safetensors",
+        shortened(name, LONGEST_PATH),
+        known.join(", ")
+    )]
     UnknownName {
         /// The name that was asked for.
         name: String,

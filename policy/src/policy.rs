@@ -103,12 +103,11 @@ impl Policy {
     }
 
     /// The policy that comes with the project for this benchmark, whose world is `world`. Where there is none it is the
-    /// first one that can drive there: other benchmarks may share actions and extras. Where none can it is the one for
-    /// `attard2023`, and [`Policy::check`] says what that lacks.
+    /// first one that can drive there: other benchmarks may share actions and extras.
     ///
     /// # Errors
     ///
-    /// None as long as the policies that come with the project can be read.
+    /// Where none can.
     pub fn shipped_for(benchmark: &str, world: &World) -> Result<Policy, Error> {
         if Policy::shipped_names().contains(&benchmark) {
             return Policy::shipped(benchmark);
@@ -116,7 +115,8 @@ impl Policy {
         let mut policies =
             Policy::shipped_names().into_iter().map(Policy::shipped).collect::<Result<Vec<Policy>, Error>>()?;
         let fits = policies.iter().position(|policy| policy.check(world).is_ok());
-        Ok(policies.swap_remove(fits.unwrap_or_default()))
+        let fits = fits.ok_or_else(|| Error::NoneFits { benchmark: benchmark.to_owned() })?;
+        Ok(policies.swap_remove(fits))
     }
 
     /// Names of the policies that come with the project.
