@@ -24,13 +24,15 @@ pub enum Error {
     },
     /// None of the policies that come with the program can drive in a benchmark.
     #[error(
-        "policy: missing; none that comes with the program has the actions and extras of {}: give a policy file, \
-         NAME.safetensors, or pursuit or random",
+        "policy: missing; none that comes with the program can drive in {}: give a policy file, NAME.safetensors, or \
+         pursuit or random; {why}",
         shortened(benchmark, LONGEST_PATH)
     )]
     NoneFits {
         /// The benchmark.
         benchmark: String,
+        /// What the first of them lacks.
+        why: String,
     },
     /// No policy of this name comes with the program.
     #[error(

@@ -107,15 +107,23 @@ impl Policy {
     ///
     /// # Errors
     ///
-    /// Where none can.
+    /// Where none can; it says what the first one, that for `attard2023`, lacks.
     pub fn shipped_for(benchmark: &str, world: &World) -> Result<Policy, Error> {
         if Policy::shipped_names().contains(&benchmark) {
             return Policy::shipped(benchmark);
         }
         let mut policies =
             Policy::shipped_names().into_iter().map(Policy::shipped).collect::<Result<Vec<Policy>, Error>>()?;
-        let fits = policies.iter().position(|policy| policy.check(world).is_ok());
-        let fits = fits.ok_or_else(|| Error::NoneFits { benchmark: benchmark.to_owned() })?;
+        let mut why = String::new();
+        let fits = policies.iter().position(|policy| match policy.check(world) {
+            Ok(()) => true,
+            Err(error) if why.is_empty() => {
+                why = error.to_string();
+                false
+            }
+            Err(_) => false,
+        });
+        let fits = fits.ok_or_else(|| Error::NoneFits { benchmark: benchmark.to_owned(), why })?;
         Ok(policies.swap_remove(fits))
     }
 
