@@ -35,11 +35,7 @@ pub enum Error {
         why: String,
     },
     /// No policy of this name comes with the program.
-    #[error(
-        "policy: {}; the program comes with {}; a policy file ends in .safetensors",
-        shortened(name, LONGEST_PATH),
-        known.join(", ")
-    )]
+    #[error("policy: {}; the program comes with {}", shortened(name, LONGEST_PATH), known.join(", "))]
     UnknownName {
         /// The name that was asked for.
         name: String,

@@ -46,10 +46,6 @@ pub struct Counts {
     pub served: u64,
     /// Those of them that stood in a blocked ring for two minutes, and were taken away.
     pub removed: u64,
-    /// Vehicles that found room to begin.
-    pub begun: u64,
-    /// Large ones of these.
-    pub large: u64,
     /// Ring cars that passed the arm's entry.
     pub circulating: u64,
     /// Sum of the control delays of cars that came up to speed behind the line (s).
@@ -71,8 +67,6 @@ impl Counts {
         self.stayed += other.stayed;
         self.served += other.served;
         self.removed += other.removed;
-        self.begun += other.begun;
-        self.large += other.large;
         self.circulating += other.circulating;
         self.delay += other.delay;
         self.delayed += other.delayed;
@@ -95,11 +89,6 @@ impl Counts {
         let n = self.delayed + self.unfinished;
         let of_all = (0 < n).then(|| (self.delay + self.delay_so_far) / n as f64);
         of_all.map(|of_all| of_all.max(self.mean_delay().unwrap_or(0.0)))
-    }
-
-    /// Fraction of large vehicles among those that came; where they do not fit it is less than was asked for.
-    pub fn heavy(&self) -> f64 {
-        self.large as f64 / self.begun.max(1) as f64
     }
 
     /// Whether more came than the lane could serve.
@@ -257,8 +246,6 @@ impl<'a> Observer<'a> {
                     let unhindered = Car { speed: limit << FINER_SPEED, ..car };
                     let free = *self.free.entry(car.what).or_insert_with(|| self.survey.free_time(unhindered));
                     self.known[slot] = self.outside[source].pop_front().map(|came| Known { came, free });
-                    self.counts[source].begun += u64::from(counts);
-                    self.counts[source].large += u64::from(counts && car.is_large());
                 }
                 Event::Left(slot) => {
                     changed[slot] = true;

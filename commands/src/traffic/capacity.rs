@@ -82,7 +82,7 @@ pub(super) fn run(args: &Args, places: &[Place], mix: Mix) -> Result<(), Error> 
             counts
         };
         let runs = (0..args.runs).into_par_iter().map(counted).collect::<Vec<Vec<Counts>>>();
-        case.points(&runs, f64::from(args.runs) * f64::from(args.minutes) / 60.0)
+        case.points(&runs, f64::from(args.runs) * f64::from(args.minutes) / 60.0, mix)
     });
     let points: Vec<(Lane, Point)> = found.collect::<Vec<_>>().into_iter().flatten().collect();
     drop(bar);
@@ -100,13 +100,13 @@ pub(super) fn run(args: &Args, places: &[Place], mix: Mix) -> Result<(), Error> 
 
 impl Case<'_> {
     /// The capacity of each lane of the arm.
-    fn points(&self, runs: &[Vec<Counts>], hours: f64) -> Vec<(Lane, Point)> {
+    fn points(&self, runs: &[Vec<Counts>], hours: f64, mix: Mix) -> Vec<(Lane, Point)> {
         let of = |(index, &source): (usize, &usize)| {
             let (arm, lane) = self.place.source_name(source);
             let kind = self.survey.lane(source);
-            let mut sum = Counts::default();
-            runs.iter().for_each(|counts| sum.add(&counts[index]));
-            let [capacity, circulating] = [sum.served, sum.circulating].map(|n| n as f64 / hours);
+            let sum = |count: fn(&Counts) -> u64| runs.iter().map(|counts| count(&counts[index])).sum::<u64>() as f64;
+            let [capacity, circulating] =
+                [sum(|counts| counts.served), sum(|counts| counts.circulating)].map(|n| n / hours);
             let point = Point {
                 flow: self.flow,
                 road: self.place.road.name.clone(),
@@ -115,7 +115,7 @@ impl Case<'_> {
                 lanes: kind.name(self.place.road.is_mirrored()),
                 circulating,
                 capacity,
-                hcm: kind.capacity(circulating, sum.heavy()),
+                hcm: kind.capacity(circulating, mix.heavy()),
             };
             (kind, point)
         };

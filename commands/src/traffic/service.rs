@@ -94,7 +94,7 @@ fn found(args: &Args, place: &Place, mix: Mix, bar: &Bar) -> Result<Found, Error
         let [served, circulating] = [counts.served, counts.circulating].map(|count| count as f64 / hours);
         let hcm = place.network.has_ring.then(|| {
             let kind = survey.lane(source);
-            let capacity = kind.capacity(circulating, counts.heavy());
+            let capacity = kind.capacity(circulating, mix.heavy());
             let delay = control_delay(demand, capacity, PERIOD);
             let queue_95 = queue_95(demand, capacity, PERIOD);
             let level = level_of_lane(delay, capacity < demand);
