@@ -37,9 +37,8 @@ pub fn distinct(written: &[Named], read: &[Named]) -> Result<(), Error> {
             let expected = format!("{found}: name another one");
             return Err(Error::Setting { name: flag, value: file.display().to_string(), expected });
         }
-        let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.exists());
-        if folder.is_some() {
-            return Err(Error::write(file)(std::io::ErrorKind::NotFound.into()));
+        if let Some(folder) = file.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+            std::fs::metadata(folder).map_err(Error::write(file))?;
         }
     }
     Ok(())
