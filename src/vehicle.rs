@@ -18,7 +18,9 @@ use glam::{DVec2, Vec2};
 pub use model::{Model, SLIP_LEVER};
 pub use single_track::{SingleTrack, Steady};
 pub use suspension::Suspension;
-pub(crate) use vehicle_keys::{WrittenModel, model as read_model};
+pub(crate) use vehicle_keys::{
+    CENTRE_OF_GRAVITY, LEAST_LEVER, TRACTOR_WHEELBASE, TRAILER_WHEELBASE, WrittenModel, model as read_model,
+};
 
 use crate::files::reader::Error;
 use crate::files::shipped::{Kind, Source};

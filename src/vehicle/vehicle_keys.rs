@@ -1,6 +1,7 @@
 //! A vehicle file as written, and the checks that turn it into a [`Vehicle`].
 
 use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 
 use glam::DVec2;
 use serde::Deserialize;
@@ -12,6 +13,12 @@ use crate::layout::N_TRACTOR_RAYS;
 
 /// Maximum length of a load's name (characters).
 const LONGEST_NAME: usize = 40;
+/// Wheelbases of a tractor and of a trailer, and heights of a centre of gravity, that a file may have (m).
+pub(crate) const TRACTOR_WHEELBASE: RangeInclusive<f64> = 2.0..=10.0;
+pub(crate) const TRAILER_WHEELBASE: RangeInclusive<f64> = 2.5..=20.0;
+pub(crate) const CENTRE_OF_GRAVITY: RangeInclusive<f64> = 0.2..=5.0;
+/// Slip leaves a trailer at least so much of its lever (m).
+pub(crate) const LEAST_LEVER: f64 = 1.0;
 
 /// The file as written. Its values are not checked yet.
 #[derive(Deserialize)]
@@ -172,7 +179,7 @@ impl Vehicle {
 
 fn tractor(reader: &Reader, written: &WrittenTractor) -> Result<Tractor, Error> {
     Ok(Tractor {
-        wheelbase: reader.within("tractor.wheelbase", written.wheelbase, 2.0..=10.0, "m")?,
+        wheelbase: reader.within("tractor.wheelbase", written.wheelbase, TRACTOR_WHEELBASE, "m")?,
         fifth_wheel: reader.within("tractor.fifth_wheel", written.fifth_wheel, -3.0..=3.0, "m")?,
         front_overhang: reader.within("tractor.front_overhang", written.front_overhang, 0.0..=3.0, "m")?,
         rear_overhang: reader.within("tractor.rear_overhang", written.rear_overhang, 0.0..=4.0, "m")?,
@@ -188,7 +195,7 @@ fn tractor(reader: &Reader, written: &WrittenTractor) -> Result<Tractor, Error> 
 fn trailer(reader: &Reader, written: &WrittenTrailer) -> Result<Trailer, Error> {
     Ok(Trailer {
         // Slip shortens this lever by up to `model.slip_lever`: it stays well positive.
-        wheelbase: reader.within("trailer.wheelbase", written.wheelbase, 2.5..=20.0, "m")?,
+        wheelbase: reader.within("trailer.wheelbase", written.wheelbase, TRAILER_WHEELBASE, "m")?,
         kingpin_to_front: reader.within("trailer.kingpin_to_front", written.kingpin_to_front, 0.0..=5.0, "m")?,
         kingpin_to_rear: reader.within("trailer.kingpin_to_rear", written.kingpin_to_rear, 1.0..=25.0, "m")?,
         width: reader.within("trailer.width", written.width, 1.0..=4.0, "m")?,
@@ -209,7 +216,7 @@ fn load(reader: &Reader, key: &str, written: &WrittenLoad) -> Result<Load, Error
 fn suspension(reader: &Reader, key: &str, written: &WrittenSuspension) -> Result<Suspension, Error> {
     let within =
         |name: &str, value, range, unit| reader.within(&format!("{key}.suspension.{name}"), value, range, unit);
-    let centre_of_gravity = within("centre_of_gravity", written.centre_of_gravity, 0.2..=5.0, "m")?;
+    let centre_of_gravity = within("centre_of_gravity", written.centre_of_gravity, CENTRE_OF_GRAVITY, "m")?;
     Ok(Suspension {
         centre_of_gravity,
         roll_centre: within("roll_centre", written.roll_centre, 0.0..=centre_of_gravity, "m")?,
@@ -235,7 +242,7 @@ pub(crate) fn model(reader: &Reader, key: &str, written: &WrittenModel, trailer:
     let within = |name: &str, value, range, unit| reader.within(&format!("{key}.{name}"), value, range, unit);
     Ok(Model {
         // Slip shortens the trailer's lever by so much: it stays well positive.
-        slip_lever: within("slip_lever", written.slip_lever, 0.0..=(trailer.wheelbase - 1.0).min(4.0), "m")?,
+        slip_lever: within("slip_lever", written.slip_lever, 0.0..=(trailer.wheelbase - LEAST_LEVER).min(4.0), "m")?,
         yaw_lag: within("yaw_lag", written.yaw_lag, 0.0..=5.0, "")?,
         drive_lag: within("drive_lag", written.drive_lag, 0.0..=5.0, "s")?,
         brake_lag: within("brake_lag", written.brake_lag, 0.0..=5.0, "s")?,

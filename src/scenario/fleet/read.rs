@@ -1,5 +1,6 @@
 //! Reads `[[vehicle]]` and `[draw]` of a benchmark file, and checks every value.
 
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use super::{Fleet, Member, N_VEHICLES, Ranges};
@@ -8,10 +9,13 @@ use crate::files::shipped::{Kind, Source};
 use crate::scenario::benchmark_keys::{Written, WrittenDraw, WrittenMember, WrittenVehicles};
 use crate::scenario::check::{Invalid, check_vehicle, within};
 use crate::scenario::referred::referred;
-use crate::vehicle::{Vehicle, read_model};
+use crate::vehicle::{CENTRE_OF_GRAVITY, LEAST_LEVER, TRACTOR_WHEELBASE, TRAILER_WHEELBASE, Vehicle, read_model};
 
 /// Maximum number of rows of a table of vehicles: they take about 45 MB with a chassis each.
 const MOST_VEHICLES: usize = 65_536;
+/// A length is drawn as so much more or less at most, and the height of a centre of gravity (m).
+const MOST_LONGER: f64 = 3.0;
+const MOST_HIGHER: f64 = 1.0;
 /// Maximum number of kinds of vehicle.
 const MOST_MEMBERS: usize = 64;
 
@@ -105,12 +109,13 @@ fn drawn(reader: &Reader, members: Vec<Member>, written: &WrittenDraw) -> Result
         }
         Ok(Some(range))
     };
-    let (length, factor, time) = ([-3.0, 3.0], [0.1, 10.0], [0.0, 5.0]);
+    let (length, height, factor, time) =
+        ([-MOST_LONGER, MOST_LONGER], [-MOST_HIGHER, MOST_HIGHER], [0.1, 10.0], [0.0, 5.0]);
     let draw = Ranges {
         trailer_wheelbase: range("trailer_wheelbase", written.trailer_wheelbase, length, "m")?,
         tractor_wheelbase: range("tractor_wheelbase", written.tractor_wheelbase, length, "m")?,
         fifth_wheel: range("fifth_wheel", written.fifth_wheel, length, "m")?,
-        centre_of_gravity: range("centre_of_gravity", written.centre_of_gravity, [-1.0, 1.0], "m")?,
+        centre_of_gravity: range("centre_of_gravity", written.centre_of_gravity, height, "m")?,
         roll_gain: range("roll_gain", written.roll_gain, factor, "")?,
         roll_frequency: range("roll_frequency", written.roll_frequency, factor, "")?,
         roll_damping: range("roll_damping", written.roll_damping, factor, "")?,
@@ -146,15 +151,17 @@ fn check_drawn(vehicle: &Vehicle) -> Result<(), Invalid> {
     let (tractor, trailer) = (&vehicle.tractor, &vehicle.trailer);
     // As of a file: nearer to the drive axle than the trailer's axles are to the kingpin.
     let nearer = trailer.wheelbase - 0.01;
-    within("tractor.wheelbase", tractor.wheelbase, [2.0, 13.0])?;
-    within("trailer.wheelbase", trailer.wheelbase, [2.5, 23.0])?;
-    within("model.slip_lever", vehicle.model.slip_lever, [0.0, trailer.wheelbase - 1.0])?;
+    let longer = |range: RangeInclusive<f64>| [*range.start(), range.end() + MOST_LONGER];
+    within("tractor.wheelbase", tractor.wheelbase, longer(TRACTOR_WHEELBASE))?;
+    within("trailer.wheelbase", trailer.wheelbase, longer(TRAILER_WHEELBASE))?;
+    within("model.slip_lever", vehicle.model.slip_lever, [0.0, trailer.wheelbase - LEAST_LEVER])?;
     within("tractor.fifth_wheel", tractor.fifth_wheel, [-nearer, nearer])?;
     let loads = vehicle.loads.iter().map(|(name, load)| (format!("loads.{name}"), &load.suspension));
     let units = std::iter::once(("tractor".to_owned(), &tractor.suspension)).chain(loads);
     for (unit, suspension) in units {
         let key = format!("{unit}.suspension.centre_of_gravity");
-        within(&key, suspension.centre_of_gravity, [suspension.roll_centre.max(0.2), 6.0])?;
+        let least = suspension.roll_centre.max(*CENTRE_OF_GRAVITY.start());
+        within(&key, suspension.centre_of_gravity, [least, CENTRE_OF_GRAVITY.end() + MOST_HIGHER])?;
     }
     Ok(())
 }
