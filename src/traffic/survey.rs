@@ -257,14 +257,10 @@ impl<'a> Observer<'a> {
                 }
                 Event::Removed(slot) => {
                     changed[slot] = true;
-                    let (path, front) = (before[slot].path(), before[slot].front());
-                    let of = &mut self.counts[self.survey.network.paths[path].source as usize];
-                    of.removed += u64::from(counts);
-                    if let Some(Known { came, free }) = self.known[slot]
-                        && counts
-                        && front <= self.survey.end_of_entry(path)
-                    {
-                        of.add_unfinished((step - came).saturating_sub(free));
+                    if counts {
+                        let source = self.survey.network.paths[before[slot].path()].source as usize;
+                        self.counts[source].removed += 1;
+                        self.count_on_entry(slot, &before[slot], step);
                     }
                 }
             }
@@ -303,16 +299,21 @@ impl<'a> Observer<'a> {
 
     /// Counts who waits outside or is on an entry after the last step, `end`.
     fn count_unfinished(&mut self, run: &Run, end: u32) {
-        let mut add = |source: usize, steps: u32| self.counts[source].add_unfinished(steps);
-        for (source, outside) in self.outside.iter().enumerate() {
-            outside.iter().for_each(|came| add(source, end - came));
+        for (counts, outside) in self.counts.iter_mut().zip(&self.outside) {
+            outside.iter().for_each(|came| counts.add_unfinished(end - came));
         }
-        for (car, known) in run.cars.iter().zip(self.known).filter(|(car, _)| car.is_there()) {
-            if let Some(Known { came, free }) = known
-                && car.front() <= self.survey.end_of_entry(car.path())
-            {
-                add(self.survey.network.paths[car.path()].source as usize, (end - came).saturating_sub(free));
-            }
+        for (slot, car) in run.cars.iter().enumerate().filter(|(_, car)| car.is_there()) {
+            self.count_on_entry(slot, car, end);
+        }
+    }
+
+    /// Counts what a car has lost until a step, if it is on an entry yet.
+    fn count_on_entry(&mut self, slot: usize, car: &Car, step: u32) {
+        if let Some(Known { came, free }) = self.known[slot]
+            && car.front() <= self.survey.end_of_entry(car.path())
+        {
+            let source = self.survey.network.paths[car.path()].source as usize;
+            self.counts[source].add_unfinished((step - came).saturating_sub(free));
         }
     }
 }

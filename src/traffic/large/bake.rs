@@ -112,9 +112,9 @@ impl Network {
             let lines: Vec<[i32; 2]> = (0..n).map(of).collect();
             // One that is longer than the way to its line would begin beyond that.
             let longest = Large::ALL.iter().filter(|kind| kind.class() == class).map(|kind| kind.extent()).max();
-            let has_room = |path: usize| class == 0 || longest.unwrap_or(0) <= lines[path][0];
-            let fits = fits[class * n..][..n].iter().enumerate();
-            tables.fits.extend(fits.map(|(path, &fits)| u32::from(fits && has_room(path))));
+            let longest = longest.unwrap_or(0);
+            let fits = fits[class * n..][..n].iter().zip(&lines);
+            tables.fits.extend(fits.map(|(&fits, &[line, _])| u32::from(fits && longest <= line)));
             tables.lines.extend(lines);
         }
         for (path, driven) in self.paths.iter().zip(&driven) {
