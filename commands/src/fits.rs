@@ -117,7 +117,7 @@ pub fn run(args: &Args) -> Result<bool, Error> {
     let n_rows = wanted_rows(&roads, &args.route) * vehicles.len();
     let bar = Bar::new("answering", "routes and vehicles", n_rows);
     let work = Work { args, asked: &asked, vehicles: &vehicles, file, bar };
-    let mut order: Vec<(String, String)> = Vec::new();
+    let mut order = Vec::new();
     for road in &roads {
         order.extend(work.road(road, &mut results)?);
     }
@@ -126,10 +126,9 @@ pub fn run(args: &Args) -> Result<bool, Error> {
     results.rows.sort_by_key(|row| order.iter().position(|key| *key == (row.route.clone(), row.vehicle.clone())));
     results.write(&file)?;
     files::write_whole(&args.output.join("fits.csv"), csv(&results.rows).as_bytes())?;
-    let mut shown: Vec<Row> =
-        order.iter().filter_map(|(route, vehicle)| results.row(route, vehicle).cloned()).collect();
-    files::write_whole(&args.output.join("verdicts.csv"), verdicts(&shown).as_bytes())?;
-    shown.retain(|row| case::is_asked(&row.route, &args.route));
+    files::write_whole(&args.output.join("verdicts.csv"), verdicts(&results.rows).as_bytes())?;
+    let asked_for = order.iter().filter(|(route, _)| case::is_asked(route, &args.route));
+    let shown: Vec<Row> = asked_for.filter_map(|(route, vehicle)| results.row(route, vehicle).cloned()).collect();
     let units = args.units();
     let fit = shown.iter().filter(|row| row.fits).count();
     files::print(&format!(
@@ -156,8 +155,8 @@ struct Work<'a> {
 }
 
 impl Work<'_> {
-    /// Answers what is not answered yet of a road and writes its sheets; gives route and vehicle of every row of it, also
-    /// of those that a call before has asked for, in order.
+    /// Answers what is not answered yet of a road and writes its sheets; gives route and vehicle of every row of it,
+    /// those of a call before among them, in order.
     fn road(&self, road: &Road, results: &mut Results) -> Result<Vec<(String, String)>, Error> {
         // Sheets of all its routes, from a call before, stay.
         if wanted_rows(std::slice::from_ref(road), &self.args.route) == 0 {

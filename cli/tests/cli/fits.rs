@@ -115,6 +115,27 @@ fn the_same_command_keeps_what_is_there_and_answers_the_rest() {
 }
 
 #[test]
+fn another_route_is_added_to_every_file_and_files_that_are_not_its_own_stay() {
+    let place = Place::new();
+    succeed(&fits(&place, &EASY));
+    let output = fits(&place, &[EASY[0], EASY[1], "--route", "E-right-1"]);
+    assert!(String::from_utf8_lossy(&output.stdout).contains(" of 1 fit: "), "{output:?}");
+    let verdicts = text(&place, "verdicts.csv");
+    assert_eq!((verdicts.lines().count(), text(&place, "fits.csv").lines().count()), (3, 3), "{verdicts}");
+    for route in ["E-right-1", "E-right-2"] {
+        assert!(verdicts.contains(route) && text(&place, "16m.svg").contains(route), "{route}");
+        let drawn = format!("{}_SWEPT_TRAILER", route.to_uppercase());
+        assert!(text(&place, "16m-eu_4x2_13m6.dxf").contains(&drawn), "{route}");
+    }
+    let other = Place::new();
+    std::fs::create_dir(other.file("fits")).unwrap();
+    std::fs::write(other.file("fits/16m.pdf"), "a plan").unwrap();
+    let said = refusal(&fits(&other, &EASY), 2);
+    assert!(said.contains("--output: ") && said.contains("16m.pdf; is there already, and no results"), "{said}");
+    assert_eq!(text(&other, "16m.pdf"), "a plan");
+}
+
+#[test]
 fn a_call_that_is_killed_goes_on_and_leaves_the_same_bytes_as_one_that_is_not() {
     let place = Place::new();
     // Long enough that the call is killed on its way on a busy machine too.
