@@ -60,6 +60,10 @@ class Trailer:
         return replace(now, yaw_rate=rates[0] / seconds, roll_rate=rates[1] / seconds)
 
 
+class Unknown(Exception):
+    """A message or a pose that has not come, or is too old."""
+
+
 class Driver(Node):
     """Observes ten times a second, and publishes a steer angle and a speed."""
 
@@ -96,29 +100,28 @@ class Driver(Node):
         """Where a frame is in the map.
 
         Raises:
-            tf2_ros.TransformException: For one that is not known, or no longer.
+            tf2_ros.TransformException: For one that is not known.
+            Unknown: For one that is not known any more.
         """
         found = self.transforms.lookup_transform("map", frame, Time())
-        age = (self.get_clock().now() - Time.from_msg(found.header.stamp)).nanoseconds * 1e-9
-        if age > STALE:
-            raise tf2_ros.TransformException(f"{frame}: {age:.2f} s old; {STALE} s at most")
+        self.check(frame, Time.from_msg(found.header.stamp))
         return found
 
-    def check(self, topic: str) -> None:
-        """Raises tf2_ros.TransformException where no message of a topic came lately."""
-        if topic not in self.heard:
-            raise tf2_ros.TransformException(f"{topic}: nothing has come")
-        age = (self.get_clock().now() - self.heard[topic]).nanoseconds * 1e-9
+    def check(self, what: str, came: Time | None) -> None:
+        """Raises Unknown for what has not come, or did so too long ago."""
+        if came is None:
+            raise Unknown(f"{what}: nothing has come")
+        age = (self.get_clock().now() - came).nanoseconds * 1e-9
         if age > STALE:
-            raise tf2_ros.TransformException(f"{topic}: {age:.2f} s old; {STALE} s at most")
+            raise Unknown(f"{what}: {age:.2f} s old; {STALE} s at most")
 
     def step(self) -> None:
         """One observation and one command."""
         try:
             tractor, trailer = self.pose("base_link"), self.pose("trailer_link")
-            self.check("odom")
-            self.check("steering_report")
-        except tf2_ros.TransformException as error:
+            for topic in ("odom", "steering_report"):
+                self.check(topic, self.heard.get(topic))
+        except (tf2_ros.TransformException, Unknown) as error:
             self.get_logger().warning(f"the truck brakes: {error}")
             self.brake()
             return
