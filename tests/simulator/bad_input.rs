@@ -15,11 +15,7 @@ use offtrack::vehicle::Vehicle;
 use offtrack::world::World;
 use proptest::prelude::*;
 
-use crate::{batch_on, benchmark, engines};
-
-fn scenarios() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios")
-}
+use crate::{batch_on, benchmark, engines, scenarios};
 
 /// Benchmarks, roundabouts, vehicles and distributions (their names without `.toml`) that have no key but those of
 /// another one.

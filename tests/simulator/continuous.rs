@@ -1,7 +1,6 @@
 //! Actions that are commands: a steer angle and a speed in place of an index.
 
 use std::fs;
-use std::path::Path;
 use std::sync::Arc;
 
 use offtrack::layout::random::{Draw, signed_unit, words};
@@ -14,7 +13,7 @@ use offtrack::world::World;
 
 use crate::episodes::{all_routes, rows};
 use crate::left_hand::{left_hand, text};
-use crate::{batch_on, benchmark, engines};
+use crate::{batch_on, benchmark, engines, scenarios};
 
 const N_ENVS: usize = 64;
 
@@ -223,7 +222,7 @@ fn a_left_hand_road_is_driven_by_commands_as_its_mirror_image_to_the_last_bit_an
 #[test]
 fn keys_of_continuous_actions_that_make_no_sense_are_refused_by_key() {
     let folder = tempfile::tempdir().unwrap();
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+    let source = scenarios();
     let text = fs::read_to_string(source.join("attard2023-continuous.toml")).unwrap();
     let text = text.replace("\"roundabouts/", &format!("\"{}/roundabouts/", source.display()));
     let text = text.replace("\"vehicles/", &format!("\"{}/vehicles/", source.display()));

@@ -1,7 +1,6 @@
 //! What the world does to a policy: what it observes late, misplaced and noisy, and actions that come late. What is
 //! stays what it is.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use offtrack::layout::{N_RAYS, N_VALUES};
@@ -9,7 +8,7 @@ use offtrack::scenario::{Disturbances, Scenario};
 use offtrack::simulator::{Batch, Engine, RouteChoice, Simulator};
 use offtrack::world::World;
 
-use crate::{batch_on, engines};
+use crate::{batch_on, engines, scenarios};
 
 /// Trucks, each on one of the routes.
 const N_ENVS: usize = 256;
@@ -274,7 +273,7 @@ fn what_is_observed_depends_on_neither_the_number_of_trucks_nor_a_trucks_place()
 #[test]
 fn disturbances_that_make_no_sense_are_refused_by_key() {
     let folder = tempfile::tempdir().unwrap();
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+    let source = scenarios();
     let text = std::fs::read_to_string(source.join("laden2026.toml")).unwrap();
     let text = text.replace("\"roundabouts/", &format!("\"{}/roundabouts/", source.display()));
     let text = text.replace("\"vehicles/", &format!("\"{}/vehicles/", source.display()));

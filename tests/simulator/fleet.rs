@@ -1,6 +1,5 @@
 //! Trucks of several kinds in one batch: drawn alike on every engine, and each drives as it would alone.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use offtrack::files::cache::Loading;
@@ -12,7 +11,7 @@ use offtrack::vehicle::Model;
 use offtrack::world::World;
 
 use crate::physics::vehicle;
-use crate::{batch_on, benchmark, engines};
+use crate::{batch_on, benchmark, engines, scenarios};
 
 /// A fleet of 512 vehicles in which everything that can be drawn is, with every lag and limit.
 pub fn all_drawn() -> Fleet {
@@ -130,7 +129,7 @@ fn a_vehicle_moves_with_its_truck_and_an_unknown_one_is_refused() {
 /// A benchmark file with these lines in place of `vehicle` and `load`.
 fn written(lines: &str) -> Result<Scenario, String> {
     let folder = tempfile::tempdir().unwrap();
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+    let source = scenarios();
     let text = std::fs::read_to_string(source.join("attard2023.toml")).unwrap();
     let text = text
         .replace("vehicle = \"vehicles/daf_xf.toml\"\nload = \"empty\"\n", "")
@@ -240,7 +239,7 @@ fn a_simulator_of_one_vehicle_has_one_row() {
 
 #[test]
 fn what_no_vehicle_file_may_have_is_not_drawn_either() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+    let folder = scenarios();
     let text = std::fs::read_to_string(folder.join("transfer2026.toml")).unwrap();
     let refused = |key: &str, range: &str| {
         let line = text.lines().find(|line| line.starts_with(&format!("{key} = "))).unwrap();

@@ -2,7 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a helper of tests fails as the test itself does")]
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use offtrack::scenario::Scenario;
@@ -56,9 +56,14 @@ mod speeds;
 mod states;
 mod traffic;
 
+/// The folder of the repository's benchmarks.
+fn scenarios() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios")
+}
+
 /// A benchmark of the repository, read and baked.
 fn benchmark(name: &str) -> (Scenario, World) {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios").join(name).with_extension("toml");
+    let path = scenarios().join(name).with_extension("toml");
     let scenario = Scenario::read(&path).unwrap();
     let world = World::bake(&scenario).unwrap();
     (scenario, world)

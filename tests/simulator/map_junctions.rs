@@ -11,6 +11,8 @@ use offtrack::map::{Gutter, Road};
 use offtrack::scenario::{Scenario, Split};
 use offtrack::world::World;
 
+use crate::scenarios;
+
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/maps")
 }
@@ -101,7 +103,7 @@ fn shipped_outlines_are_what_their_maps_give() {
 
 #[test]
 fn a_benchmark_drives_ways_by_road_and_lane() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+    let root = scenarios();
     let text = fs::read_to_string(root.join("maps2026-crossing.toml")).unwrap();
     let head = text.split("[[roundabout]]").next().unwrap().replace("\"vehicles/daf_xf.toml\"", "\"daf_xf\"");
     let file = tempfile::tempdir().unwrap().keep().join("crossing.toml");

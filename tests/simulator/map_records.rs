@@ -2,7 +2,7 @@
 //! parameters, offsets; loops beside the road.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use offtrack::files::cache::Loading;
 use offtrack::map::Road;
@@ -10,10 +10,7 @@ use offtrack::map::opendrive::{Hand, Map};
 use offtrack::scenario::Scenario;
 
 use crate::map_kinds::{file, imported, parsed, plain};
-
-fn scenarios() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios")
-}
+use crate::scenarios;
 
 fn warnings(text: &str) -> String {
     parsed(text).warnings().collect::<Vec<_>>().join("\n")

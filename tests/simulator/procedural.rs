@@ -10,7 +10,7 @@ use offtrack::scenario::{Scenario, Split};
 use offtrack::simulator::{Engine, RouteChoice};
 use offtrack::world::World;
 
-use crate::batch_on;
+use crate::{batch_on, scenarios};
 
 const HEAD: &str = r#"
 load = "empty"
@@ -21,10 +21,6 @@ reward = { waypoint = 100.0, lane_distance = -1.5, lane_distance_limit = 4.0, fa
 "#;
 
 const ROADS: &str = "seed = 7\ncount = 20\ntrain = [0, 3]\nvalidation = [15, 16]\ntest = [10, 12]\n";
-
-fn scenarios() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios")
-}
 
 /// A benchmark with these keys of `[procedural]` and, after them, whatever else.
 fn benchmark(folder: &Path, procedural: &str) -> PathBuf {

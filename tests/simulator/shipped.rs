@@ -1,7 +1,7 @@
 //! The embedded scenario files against the folder they come from, and how names and paths find them.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use offtrack::files::shipped::{FILES, Kind, Source};
 use offtrack::map::procedural::Distribution;
@@ -9,9 +9,7 @@ use offtrack::map::{Gutter, Road};
 use offtrack::scenario::Scenario;
 use offtrack::vehicle::Vehicle;
 
-fn scenarios() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios")
-}
+use crate::scenarios;
 
 /// Path below `folder` and text of every TOML file in it, at any depth.
 fn on_disk(folder: &Path, below: &Path, files: &mut BTreeMap<String, String>) {
