@@ -114,17 +114,11 @@ impl Policy {
         }
         let mut policies =
             Policy::shipped_names().into_iter().map(Policy::shipped).collect::<Result<Vec<Policy>, Error>>()?;
-        let mut why = String::new();
-        let fits = policies.iter().position(|policy| match policy.check(world) {
-            Ok(()) => true,
-            Err(error) if why.is_empty() => {
-                why = error.to_string();
-                false
-            }
-            Err(_) => false,
-        });
-        let fits = fits.ok_or_else(|| Error::NoneFits { benchmark: benchmark.to_owned(), why })?;
-        Ok(policies.swap_remove(fits))
+        if let Some(fits) = policies.iter().position(|policy| policy.check(world).is_ok()) {
+            return Ok(policies.swap_remove(fits));
+        }
+        let why = policies[0].check(world).map_or_else(|error| error.to_string(), |()| String::new());
+        Err(Error::NoneFits { benchmark: benchmark.to_owned(), why })
     }
 
     /// Names of the policies that come with the project.

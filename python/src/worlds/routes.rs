@@ -14,8 +14,8 @@ const LONGEST_LIST: usize = 600;
 const LONGEST_NAME: usize = 100;
 
 /// Leaves the scenario the routes of a split, or those of any split that `names` has: each a route, or all routes of a
-/// roundabout. One that the benchmark does not have is added, as `wide/7/12` is. Returns the name of the split that all of
-/// these are of, or `routes`.
+/// roundabout. One that the benchmark does not have is added, as `wide/7/12` is. Returns the name of the split that all
+/// of these are of, or `routes`.
 pub fn narrow(scenario: &mut Scenario, split: &str, names: Option<&[String]>) -> PyResult<&'static str> {
     let Some(split) = Split::ALL.into_iter().find(|known| known.name() == split) else {
         let known = Split::ALL.map(Split::name).join(", ");

@@ -210,7 +210,8 @@ fn moved(curve: &Curve, by: DVec2) -> Curve {
     Curve { pieces: curve.pieces.iter().map(piece).collect() }
 }
 
-/// An error for a way that does not lead from an arm through the ring, whose outermost kerb has this radius (m), to one.
+/// An error for a way that does not lead from an arm through the ring, whose outermost kerb has this radius (m), to an
+/// arm.
 fn check_way(reader: &Reader, way: &Curve, drawn: &Entity, outer: f64) -> Result<(), Error> {
     let ends = [way.point_at(0.0), way.point_at(way.length())];
     let found = if drawn.is_closed || ends[0].distance(ends[1]) <= GAP {

@@ -4,8 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use crate::map::ground::Arm;
 
-/// The arms at these bearings (rad) with their names, or what is wrong with those that are given, which follow each other
-/// counter-clockwise from east as the road is seen; none is given where they are to be found.
+/// The arms at these bearings (rad) with their names, or what is wrong with those that are given, which follow each
+/// other counter-clockwise from east as the road is seen; none is given where they are to be found.
 pub(in crate::map) fn named(bearings: &[f64], given: &[String], mirrored: bool) -> Result<Vec<Arm>, String> {
     let bearings: Vec<f64> = bearings.iter().map(|bearing| bearing.rem_euclid(TAU)).collect();
     // In the mirror image of a map its arms follow each other clockwise.
