@@ -117,7 +117,7 @@ def drive(truck: dict, init: dict, commands: list[dict], times: list[float]) -> 
         after = wish + (a - wish) * math.exp(-STEP / lag) if lag else wish
         mean = 0.5 * (a + after) if lag else wish
         speed = v + STEP * mean
-        if holds and v * speed <= 0:
+        if (holds or v > 0) and v * speed <= 0:
             after, mean, speed = 0.0, 0.0, 0.0
         within_lock, largest = clamp(target_delta, -truck["delta_max"], truck["delta_max"]), truck["delta_rate"] * STEP
         turned = delta + clamp(within_lock - delta, -largest, largest)

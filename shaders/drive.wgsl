@@ -168,7 +168,9 @@ fn moved(rig: Rig, substep: f32, control: Control, start: Moving) -> Moving {
     var acceleration = asked + response.left * (truck.acceleration - asked);
     var mean_acceleration = asked + response.mean * (truck.acceleration - asked);
     var speed = truck.speed + mean_acceleration * substep;
-    if control.holds == 1u && truck.speed * speed <= 0.0 {
+    // Brakes that act late stop a truck. They do not drive it backwards.
+    let may_stop = control.holds == 1u || 0.0 < truck.speed;
+    if may_stop && truck.speed * speed <= 0.0 {
         acceleration = 0.0;
         mean_acceleration = -truck.speed / substep;
         speed = 0.0;

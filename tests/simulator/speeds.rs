@@ -58,6 +58,24 @@ fn a_target_of_0_stops_the_truck_and_holds_it_until_another_is_asked_for() {
 }
 
 #[test]
+fn brakes_that_act_late_do_not_drive_a_truck_backwards() {
+    let world = world(|scenario| {
+        (scenario.speeds, scenario.time_limit) = (Vec::from([2.0 * KMH, 30.0 * KMH]), 20.0);
+        scenario.vehicle.model = Model { drive_lag: 2.0, brake_lag: 2.0, ..Model::default() };
+        scenario.start_speed = Some([30.0 * KMH; 2]);
+    });
+    for (name, engine) in engines() {
+        let mut simulator = batch_on(&engine, &world, 1, 0, RouteChoice::Fixed(vec![3]));
+        let speeds: Vec<f32> =
+            driven(&mut simulator, std::iter::repeat_n(4, 150)).iter().map(|truck| truck.speed).collect();
+        // It brakes on beyond 2 km/h, comes to a stop, and sets out again.
+        assert!(speeds.iter().all(|&speed| 0.0 <= speed), "{name}: {speeds:?}");
+        let stopped = speeds.iter().position(|&speed| speed < 0.01).unwrap_or_else(|| panic!("{name}: {speeds:?}"));
+        assert!(speeds[stopped..].iter().any(|&speed| 0.1 < speed), "{name}: {speeds:?}");
+    }
+}
+
+#[test]
 fn an_action_may_change_the_target_speed_within_its_bounds() {
     let world = world(|scenario| {
         scenario.speeds = Vec::from([10.0 * KMH, 20.0 * KMH]);

@@ -200,7 +200,9 @@ pub fn moved(rig: &Rig, substep: f32, control: &Control, start: &Moving) -> Movi
     let mut acceleration = asked + lag.left * (truck.acceleration - asked);
     let mut mean_acceleration = asked + lag.mean * (truck.acceleration - asked);
     let mut speed = truck.speed + mean_acceleration * substep;
-    if control.holds == 1 && truck.speed * speed <= 0.0 {
+    // Brakes that act late stop a truck. They do not drive it backwards.
+    let may_stop = control.holds == 1 || 0.0 < truck.speed;
+    if may_stop && truck.speed * speed <= 0.0 {
         (acceleration, mean_acceleration, speed) = (0.0, -truck.speed / substep, 0.0);
     }
 
