@@ -11,9 +11,9 @@ fn first_waypoint(n_waypoints: u32, along: f32) -> u32 {
     return min(u32(round(along * f32(n_waypoints - 1u))), n_waypoints - 2u);
 }
 
-// The truck with the headings, the wheels and the lean with which it comes to the waypoint of index `last` of a route,
-// once its reference point has followed the route from its first waypoint at a speed (m/s). Both units begin along
-// that.
+// The truck, still upright, with the headings and the wheels with which it comes to the waypoint of index `last` of a
+// route, once its reference point has followed the route from its first waypoint at a speed (m/s). Both units begin
+// along that.
 fn standing_at(rig: Rig, speed: f32, route: Route, last: u32) -> Truck {
     let lane = waypoint_at(route.first + last).direction;
     let units = followed_by(rig, speed, route, last);
@@ -26,7 +26,7 @@ fn standing_at(rig: Rig, speed: f32, route: Route, last: u32) -> Truck {
     truck.trailer_heading = arc_tangent(units.trailer.y, units.trailer.x);
     truck.speed = speed;
     truck.steering = clamp(steering, -rig.steer_max, rig.steer_max);
-    return settled(rig, truck);
+    return truck;
 }
 
 // Headings of both units as unit vectors.

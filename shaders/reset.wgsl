@@ -99,6 +99,7 @@ fn start(env: u32, begin: BeginRow) {
     if (begin.what & IS_FIRST) == 0u { episode = truck[env].episode + 1u; }
     var route = begin.route;
     if (begin.what & HAS_ROUTE) == 0u { route = route_of(env, episode); }
+    let shares = shares_arms(env, route);
     var start = begin.start;
     if (begin.what & HAS_START) == 0u {
         let pose = words(stream.seed, stream.env, episode, DRAW_POSE);
@@ -106,6 +107,11 @@ fn start(env: u32, begin: BeginRow) {
         let vehicle = index_below(kind.x, params.n_vehicles);
         let along = params.start_along * (0.5 * (signed_unit(kind.z) + 1.0));
         start = Start(signed_unit(pose.x), signed_unit(pose.y), signed_unit(kind.y), along, vehicle);
+        if shares {
+            // Off their lanes' centres, trucks beside each other may stand in each other.
+            start.offset = 0.0;
+            start.heading = 0.0;
+        }
     }
     let lane = route_at(route);
     let wheelbase = vehicles[start.vehicle].rig.wheelbase;
@@ -119,6 +125,8 @@ fn start(env: u32, begin: BeginRow) {
     } else {
         standing = standing_at(vehicles[start.vehicle].rig, speed, lane, first);
     }
+    let leans = first != 0u || vehicles[start.vehicle].rig.crossfall != 0.0;
+    if leans { standing = settled(vehicles[start.vehicle].rig, standing); }
     var after = started(params, wheelbase, waypoint_at(lane.first + first), standing, start);
     after.route = route;
     after.episode = episode;
@@ -154,6 +162,22 @@ fn route_of(env: u32, episode: u32) -> u32 {
         }
     }
     return route;
+}
+
+// Whether some trucks of a truck's group, which begins on this route, begin on one arm: they are more than arms.
+fn shares_arms(env: u32, route: u32) -> bool {
+    if batch.group <= 1u { return false; }
+    var arms = 0u;
+    if batch.fixed != 0u {
+        let group = first_of_group(env);
+        for (var mate = group; mate < group + batch.group; mate++) { arms |= arm_bit(choice[mate]); }
+    } else {
+        for (var index = 0u; index < batch.n_routes; index++) {
+            let other = choice[index];
+            if road_of(other) == road_of(route) { arms |= arm_bit(other); }
+        }
+    }
+    return countOneBits(arms) < batch.group;
 }
 
 // An index below `n` for the route of a truck's episode.

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::batch::Block;
 use super::cpu::{entry, reset};
 use super::stages::Stage;
-use super::{Autoreset, Batch, Row, Tally};
+use super::{Autoreset, Batch, RouteChoice, Row, Tally};
 use crate::layout::{BEGINS, BeginRow, Ended, MOST_IN_GROUP, Progress, Stream, Truck};
 use crate::world::World;
 
@@ -167,6 +167,20 @@ pub(super) fn route_of(world: &World, routes: &[u32], row: &Row, episode: u32) -
         route = free().nth(drawn(mate, free().count())).unwrap_or(first);
     }
     route
+}
+
+/// Whether some trucks of the row's group, one of which begins on this route, begin on one arm: they are more than arms.
+pub(super) fn shares_arms(world: &World, row: &Row, route: u32) -> bool {
+    if row.mates.is_empty() {
+        return false;
+    }
+    let add = |arms: u32, route: u32| arms | 1 << begins_in(world, route)[0];
+    let road = |route: u32| world.routes[route as usize].roundabout;
+    let arms = match row.choice {
+        RouteChoice::Fixed(routes) => row.mates.iter().map(|mate| routes[mate.env as usize]).fold(0, add),
+        RouteChoice::Drawn(routes) => routes.iter().copied().filter(|&other| road(other) == road(route)).fold(0, add),
+    };
+    (arms.count_ones() as usize) < row.mates.len()
 }
 
 /// Where a route begins among other vehicles: index of the arm, and of the lane among all of the road; zeros where

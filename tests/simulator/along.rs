@@ -114,6 +114,25 @@ fn a_start_at_the_first_waypoint_is_what_a_start_has_always_been() {
 }
 
 #[test]
+fn a_truck_on_a_road_that_tilts_begins_as_it_leans() {
+    let mut scenario = benchmark("attard2023").0;
+    scenario.load = "laden_high".into();
+    scenario.vehicle.model.crossfall = 0.05;
+    let world = Arc::new(World::bake(&scenario).unwrap());
+    for (name, engine) in engines() {
+        let mut simulator = batch_on(&engine, &world, 2, 0, RouteChoice::Fixed(vec![3; 2]));
+        simulator.reset_from(&[Start::default(), along(0.01)]).unwrap();
+        let leaning: Vec<f32> = (0..5)
+            .map(|_| {
+                simulator.step(&[4; 2]).unwrap();
+                simulator.batch().truck[0].load_transfer_ratio()
+            })
+            .collect();
+        assert!(leaning.iter().all(|ratio| 0.1 < *ratio && (ratio - leaning[0]).abs() < 1e-3), "{name}: {leaning:?}");
+    }
+}
+
+#[test]
 fn errors_of_a_start_along_a_route_move_and_turn_the_truck_as_a_whole() {
     let world = Arc::new(benchmark("attard2023").1);
     for (name, engine) in engines() {

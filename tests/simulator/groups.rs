@@ -80,6 +80,21 @@ fn trucks_of_a_group_share_road_vehicles_and_episode_and_begin_in_lanes_of_their
 }
 
 #[test]
+fn trucks_that_begin_on_one_arm_do_not_stand_in_each_other() {
+    let (scenario, world) = world(8);
+    let place = scenario.places.iter().position(|place| place.roundabout.name == "50m").unwrap();
+    let is_there = |route: &u32| world.routes[*route as usize].roundabout as usize == place;
+    let routes: Vec<u32> = scenario.split(Split::Train).iter().copied().filter(is_there).collect();
+    for (name, engine) in engines() {
+        let n_envs = 8 * if name == "CPU" { 100 } else { 20 };
+        let mut simulator = batch_on(&engine, &world, n_envs, 3, RouteChoice::Drawn(routes.clone()));
+        simulator.step(&vec![4; n_envs]).unwrap();
+        let ended: Vec<Ended> = (0..n_envs).map(|env| ended(&simulator, env)).collect();
+        assert!(ended.iter().all(|&ended| ended == Ended::Running), "{name}: {ended:?}");
+    }
+}
+
+#[test]
 fn neither_threads_nor_the_size_of_the_batch_change_what_a_group_does() {
     let (scenario, world) = world(4);
     let stepped = |n_envs: usize, n_threads: usize| {

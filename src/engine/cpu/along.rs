@@ -9,7 +9,7 @@
 
 use glam::Vec2;
 
-use crate::engine::cpu::drive::{settled, steered_wheelbase};
+use crate::engine::cpu::drive::steered_wheelbase;
 use crate::layout::angle::{TINY, arc_tangent};
 use crate::layout::shared::constants;
 use crate::layout::{Rig, Truck, WaypointRow};
@@ -26,8 +26,8 @@ pub fn first_waypoint(n_waypoints: u32, along: f32) -> u32 {
     ((along * (n_waypoints - 1) as f32).round_ties_even() as u32).min(n_waypoints - 2)
 }
 
-/// The truck with the headings, the wheels and the lean with which it comes to the last of these waypoints, once its
-/// reference point has followed them from the first at a speed (m/s). Both units begin along the first.
+/// The truck, still upright, with the headings and the wheels with which it comes to the last of these waypoints, once
+/// its reference point has followed them from the first at a speed (m/s). Both units begin along the first.
 pub fn standing_at(rig: &Rig, speed: f32, waypoints: &[WaypointRow]) -> Truck {
     let lane = waypoints[waypoints.len() - 1].direction;
     let units = followed_by(rig, speed, waypoints);
@@ -35,14 +35,13 @@ pub fn standing_at(rig: &Rig, speed: f32, waypoints: &[WaypointRow]) -> Truck {
     // The reference point is half a wheelbase ahead of the drive axle, which without slip moves along the tractor.
     let side = units.tractor.perp_dot(lane) * steered_wheelbase(rig, speed);
     let steering = arc_tangent(side, units.tractor.dot(lane) * 0.5 * rig.wheelbase);
-    let truck = Truck {
+    Truck {
         heading: arc_tangent(tractor.y, tractor.x),
         trailer_heading: arc_tangent(units.trailer.y, units.trailer.x),
         speed,
         steering: steering.clamp(-rig.steer_max, rig.steer_max),
         ..Truck::default()
-    };
-    settled(rig, &truck)
+    }
 }
 
 /// Headings of both units as unit vectors.
@@ -109,6 +108,7 @@ fn pulled(heading: Vec2, unit_length: f32, way: Vec2) -> Vec2 {
 mod tests {
     use super::*;
     use crate::engine::cpu::drive::driven;
+    use crate::engine::cpu::drive::settled;
     use crate::engine::cpu::follow::reference_point;
     use crate::layout::Control;
     use crate::layout::angle::{direction, wrapped};
@@ -140,7 +140,7 @@ mod tests {
                 WaypointRow { position: centre + radius * out, direction: side * out.perp() }
             };
             let waypoints: Vec<WaypointRow> = (0..(12.0 * radius / 2.0) as i32).rev().map(at).collect();
-            let found = standing_at(&rig, 7.0, &waypoints);
+            let found = settled(&rig, &standing_at(&rig, 7.0, &waypoints));
             let off = [
                 wrapped(found.heading - steady.heading),
                 wrapped(found.trailer_heading - steady.trailer_heading),

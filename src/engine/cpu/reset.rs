@@ -2,6 +2,7 @@
 //!
 //! Route and pose are functions of (seed, env, episode) alone, where the caller states none.
 
+use crate::engine::cpu::drive::settled;
 use crate::engine::cpu::follow::{followed, reference_point};
 use crate::engine::cpu::traffic::surround;
 use crate::engine::cpu::{along, around, observe, perceive, sense};
@@ -79,7 +80,12 @@ pub(in crate::engine) fn put(world: &World, row: &mut Row, begin: &BeginRow) {
     let Stream { seed, env } = row.stream;
     let episode = if begin.what & IS_FIRST == 0 { row.truck.episode + 1 } else { 0 };
     let route = if begin.what & HAS_ROUTE == 0 { route_of(world, row, episode) } else { begin.route };
-    let start = if begin.what & HAS_START == 0 { drawn_start(&world.params, seed, env, episode) } else { begin.start };
+    let mut start =
+        if begin.what & HAS_START == 0 { drawn_start(&world.params, seed, env, episode) } else { begin.start };
+    if begin.what & HAS_START == 0 && group::shares_arms(world, row, route) {
+        // Off their lanes' centres, trucks beside each other may stand in each other.
+        (start.offset, start.heading) = (0.0, 0.0);
+    }
     let waypoints = world.route_waypoints(route);
     let rig = &world.rigs[start.vehicle as usize];
     let first = along::first_waypoint(waypoints.len() as u32, start.along) as usize;
@@ -90,6 +96,8 @@ pub(in crate::engine) fn put(world: &World, row: &mut Row, begin: &BeginRow) {
     } else {
         along::standing_at(rig, speed, &waypoints[..=first])
     };
+    let leans = first != 0 || rig.crossfall != 0.0;
+    let standing = if leans { settled(rig, &standing) } else { standing };
     let at_start = started(&world.params, rig, &waypoints[first], &standing, &start);
     *row.truck = Truck { route, episode, ..at_start };
     let steering = at_start.steering;
