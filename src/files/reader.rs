@@ -4,6 +4,7 @@
 //! Messages stay short and harmless whatever the file holds: long lines and values are cut, large numbers are printed
 //! with an exponent, characters that a terminal obeys are escaped. Errors see to it where they are shown.
 
+mod exactly;
 mod message;
 #[cfg(test)]
 mod tests;
@@ -16,6 +17,7 @@ use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 
+pub use exactly::Exactly;
 pub use message::{LONGEST_PATH, differing, printable, shortened, shown, shown_path};
 
 /// What can be wrong with a file.

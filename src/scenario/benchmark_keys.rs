@@ -8,6 +8,7 @@ use serde::de::value::SeqAccessDeserializer;
 use serde::de::{Deserializer, SeqAccess, Visitor};
 
 use super::{ActionKind, Clock, Reward};
+use crate::files::reader::Exactly;
 use crate::layout::ObservedExtras;
 use crate::map::Gutter;
 use crate::map::opendrive::{Hand, RoadLane};
@@ -96,23 +97,23 @@ fn one() -> f64 {
 #[serde(deny_unknown_fields, default)]
 pub(super) struct WrittenDraw {
     pub(super) n_vehicles: Option<usize>,
-    pub(super) trailer_wheelbase: Option<[f64; 2]>,
-    pub(super) tractor_wheelbase: Option<[f64; 2]>,
-    pub(super) fifth_wheel: Option<[f64; 2]>,
-    pub(super) centre_of_gravity: Option<[f64; 2]>,
-    pub(super) roll_gain: Option<[f64; 2]>,
-    pub(super) roll_frequency: Option<[f64; 2]>,
-    pub(super) roll_damping: Option<[f64; 2]>,
-    pub(super) slip: Option<[f64; 2]>,
-    pub(super) friction: Option<[f64; 2]>,
-    pub(super) steer_rate: Option<[f64; 2]>,
-    pub(super) acceleration_max: Option<[f64; 2]>,
-    pub(super) steer_delay: Option<[f64; 2]>,
-    pub(super) drive_lag: Option<[f64; 2]>,
-    pub(super) brake_lag: Option<[f64; 2]>,
-    pub(super) yaw_lag: Option<[f64; 2]>,
-    pub(super) slip_growth: Option<[f64; 2]>,
-    pub(super) understeer_deg: Option<[f64; 2]>,
+    pub(super) trailer_wheelbase: Option<Exactly<f64, 2>>,
+    pub(super) tractor_wheelbase: Option<Exactly<f64, 2>>,
+    pub(super) fifth_wheel: Option<Exactly<f64, 2>>,
+    pub(super) centre_of_gravity: Option<Exactly<f64, 2>>,
+    pub(super) roll_gain: Option<Exactly<f64, 2>>,
+    pub(super) roll_frequency: Option<Exactly<f64, 2>>,
+    pub(super) roll_damping: Option<Exactly<f64, 2>>,
+    pub(super) slip: Option<Exactly<f64, 2>>,
+    pub(super) friction: Option<Exactly<f64, 2>>,
+    pub(super) steer_rate: Option<Exactly<f64, 2>>,
+    pub(super) acceleration_max: Option<Exactly<f64, 2>>,
+    pub(super) steer_delay: Option<Exactly<f64, 2>>,
+    pub(super) drive_lag: Option<Exactly<f64, 2>>,
+    pub(super) brake_lag: Option<Exactly<f64, 2>>,
+    pub(super) yaw_lag: Option<Exactly<f64, 2>>,
+    pub(super) slip_growth: Option<Exactly<f64, 2>>,
+    pub(super) understeer_deg: Option<Exactly<f64, 2>>,
 }
 
 /// What the world does to a policy.
@@ -126,8 +127,8 @@ pub(super) struct WrittenDisturbances {
     pub(super) position_noise: f64,
     pub(super) heading_noise_deg: f64,
     pub(super) map_offset: f64,
-    pub(super) observation_delay: [i64; 2],
-    pub(super) action_delay: [i64; 2],
+    pub(super) observation_delay: Exactly<i64, 2>,
+    pub(super) action_delay: Exactly<i64, 2>,
 }
 
 /// Other vehicles on the roads.
@@ -287,7 +288,7 @@ impl Default for WrittenRoutes {
 pub(super) struct WrittenRoundabout {
     pub(super) file: PathBuf,
     /// For a map: a point near the ring, its hand of traffic, and names.
-    pub(super) ring: Option<[f64; 2]>,
+    pub(super) ring: Option<Exactly<f64, 2>>,
     #[serde(default)]
     pub(super) hand: Hand,
     pub(super) name: Option<String>,
@@ -311,9 +312,9 @@ pub(super) struct WrittenProcedural {
     pub(super) distribution: PathBuf,
     pub(super) seed: u32,
     pub(super) count: usize,
-    pub(super) train: Option<[u32; 2]>,
-    pub(super) validation: Option<[u32; 2]>,
-    pub(super) test: Option<[u32; 2]>,
+    pub(super) train: Option<Exactly<u32, 2>>,
+    pub(super) validation: Option<Exactly<u32, 2>>,
+    pub(super) test: Option<Exactly<u32, 2>>,
 }
 
 /// `"all"`, or routes by their name within the roundabout.

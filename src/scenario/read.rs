@@ -8,7 +8,7 @@ use super::roads::{MOST_ROADS, Procedural};
 use super::traffic;
 use super::{ActionKind, Scenario, Traffic};
 use crate::files::cache::Loading;
-use crate::files::reader::{Error, Reader};
+use crate::files::reader::{Error, Exactly, Reader};
 use crate::files::shipped::Source;
 use crate::layout::MOST_IN_GROUP;
 use crate::traffic::together;
@@ -138,7 +138,7 @@ fn steer_levels(reader: &Reader, actions: &WrittenActions) -> Result<Vec<f64>, E
 /// Checks `[disturbances]`.
 fn disturbances(reader: &Reader, written: &WrittenDisturbances) -> Result<Disturbances, Error> {
     let within = |key: &str, value, most, unit| reader.within(&format!("disturbances.{key}"), value, 0.0..=most, unit);
-    let delays = |key: &str, ends: [i64; 2]| {
+    let delays = |key: &str, Exactly(ends): Exactly<i64, 2>| {
         for (index, end) in ends.into_iter().enumerate() {
             let key = format!("disturbances.{key}[{index}]");
             reader.within(&key, end as f64, 0.0..=f64::from(LONGEST_DELAY), "steps")?;
@@ -224,14 +224,20 @@ fn range(reader: &Reader, key: &str, written: &WrittenRange, most: f64, unit: &s
     reader.within(key, greatest, 0.0..=most, unit)?;
     if greatest < least {
         let found = format_args!("[{least}, {greatest}]");
-        return Err(reader.invalid(key, found, "must be a number or [least, greatest]"));
+        return Err(reader.invalid(key, found, "must be a number or [least, greatest], the least first"));
     }
     Ok([least, greatest])
 }
 
+/// Most values of a list.
+const MOST_VALUES: usize = 64;
+
 /// A non-empty list of finite numbers within a range.
 fn numbers(reader: &Reader, key: &str, values: &[f64], most: f64, least: f64, unit: &str) -> Result<Vec<f64>, Error> {
-    reader.count(key, values.len(), 1..=64)?;
+    if !(1..=MOST_VALUES).contains(&values.len()) {
+        let found = format_args!("{} values", values.len());
+        return Err(reader.invalid(key, found, format!("must lie in 1..{MOST_VALUES}")));
+    }
     values
         .iter()
         .enumerate()

@@ -8,7 +8,7 @@ use super::benchmark_keys::{WrittenChoice, WrittenProcedural, WrittenRoundabout}
 use super::referred::referred;
 use super::{Place, Scenario, Split};
 use crate::files::cache::Loading;
-use crate::files::reader::{Error, Reader, shown};
+use crate::files::reader::{Error, Exactly, Reader, shown};
 use crate::files::shipped::{Kind, Source};
 use crate::map::Road;
 use crate::map::chosen::{Choice, is_map};
@@ -46,7 +46,8 @@ impl Procedural {
         reader.count("procedural.count", *count, 1..=MOST_INDICES)?;
         let mut ranges: [Range<u32>; 3] = Default::default();
         let given = [train, validation, test].map(Option::as_ref);
-        for (split, &[from, to]) in Split::ALL.into_iter().zip(given).filter_map(|(split, range)| Some((split, range?)))
+        for (split, &Exactly([from, to])) in
+            Split::ALL.into_iter().zip(given).filter_map(|(split, range)| Some((split, range?)))
         {
             let key = format!("procedural.{}", split.name());
             let value = format!("[{from}, {to}]");
@@ -87,10 +88,10 @@ impl Scenario {
         let read = |source: &Source| match source {
             Source::Disk(file) if is_map(file) => {
                 let WrittenRoundabout { hand, name, arms, .. } = written;
-                for (index, value) in written.ring.into_iter().flatten().enumerate() {
+                for (index, value) in written.ring.iter().flat_map(|ring| ring.0).enumerate() {
                     reader.within(&format!("{key}.ring[{index}]"), value, -FARTHEST_RING..=FARTHEST_RING, "m")?;
                 }
-                let ring = written.ring.map(DVec2::from);
+                let ring = written.ring.map(|ring| DVec2::from(ring.0));
                 let ways =
                     written.way.iter().map(|way| Way { from: (&way.from).into(), to: (&way.to).into() }).collect();
                 Road::from_map(file, &Choice { ring, hand: *hand, name: name.clone(), arms: arms.clone(), ways })

@@ -7,7 +7,7 @@ use glam::DVec2;
 use serde::Deserialize;
 
 use super::{Load, Model, Sensors, SpeedControl, Suspension, Tractor, Trailer, Vehicle};
-use crate::files::reader::{Error, Reader, printable};
+use crate::files::reader::{Error, Exactly, Reader, printable};
 use crate::files::shipped::Source;
 use crate::layout::N_TRACTOR_RAYS;
 
@@ -15,6 +15,8 @@ use crate::layout::N_TRACTOR_RAYS;
 const LONGEST_NAME: usize = 40;
 /// Wheelbases of a tractor and of a trailer, and heights of a centre of gravity, that a file may have (m).
 pub(crate) const TRACTOR_WHEELBASE: RangeInclusive<f64> = 2.0..=10.0;
+pub(crate) const KINGPIN_TO_FRONT: RangeInclusive<f64> = 0.0..=5.0;
+pub(crate) const KINGPIN_TO_REAR: RangeInclusive<f64> = 1.0..=25.0;
 pub(crate) const TRAILER_WHEELBASE: RangeInclusive<f64> = 2.5..=20.0;
 pub(crate) const CENTRE_OF_GRAVITY: RangeInclusive<f64> = 0.2..=5.0;
 /// Slip leaves a trailer at least so much of its lever (m).
@@ -99,7 +101,7 @@ impl Default for WrittenSpeedControl {
 #[derive(Deserialize, Default)]
 #[serde(deny_unknown_fields, default)]
 struct WrittenSensors {
-    tractor_mounts: Option<Vec<[f64; 2]>>,
+    tractor_mounts: Option<Vec<Exactly<f64, 2>>>,
     trailer_first: Option<f64>,
     trailer_last: Option<f64>,
 }
@@ -196,8 +198,8 @@ fn trailer(reader: &Reader, written: &WrittenTrailer) -> Result<Trailer, Error> 
     Ok(Trailer {
         // Slip shortens this lever by up to `model.slip_lever`: it stays well positive.
         wheelbase: reader.within("trailer.wheelbase", written.wheelbase, TRAILER_WHEELBASE, "m")?,
-        kingpin_to_front: reader.within("trailer.kingpin_to_front", written.kingpin_to_front, 0.0..=5.0, "m")?,
-        kingpin_to_rear: reader.within("trailer.kingpin_to_rear", written.kingpin_to_rear, 1.0..=25.0, "m")?,
+        kingpin_to_front: reader.within("trailer.kingpin_to_front", written.kingpin_to_front, KINGPIN_TO_FRONT, "m")?,
+        kingpin_to_rear: reader.within("trailer.kingpin_to_rear", written.kingpin_to_rear, KINGPIN_TO_REAR, "m")?,
         width: reader.within("trailer.width", written.width, 1.0..=4.0, "m")?,
     })
 }
@@ -266,7 +268,7 @@ fn sensors(reader: &Reader, written: &WrittenSensors, tractor: &Tractor, trailer
     let mut tractor_mounts = [DVec2::new(front, 0.0); N_TRACTOR_RAYS];
     if let Some(mounts) = &written.tractor_mounts {
         reader.count("sensors.tractor_mounts", mounts.len(), N_TRACTOR_RAYS..=N_TRACTOR_RAYS)?;
-        for (index, (mount, &[ahead, left])) in tractor_mounts.iter_mut().zip(mounts).enumerate() {
+        for (index, (mount, &Exactly([ahead, left]))) in tractor_mounts.iter_mut().zip(mounts).enumerate() {
             let key = format!("sensors.tractor_mounts[{index}]");
             let half_width = 0.5 * tractor.width;
             *mount = DVec2::new(

@@ -204,6 +204,7 @@ fn what_is_wrong_with_a_fleet_is_named() {
         (format!("{member}model = {{ slip_lever = 9.0 }}"), "vehicle[0].model.slip_lever: 9 m; must lie in 0..4 m"),
         (format!("{member}share = 0"), "vehicle[0].share: 0; must lie in"),
         (format!("{member}[draw]\nslip = [1.1, 0.9]"), "draw.slip: [1.1, 0.9]; must be [least, greatest]"),
+        (format!("{member}[draw]\nslip = [0.9, 1.0, 1.1]"), "invalid length 3, expected 2 values"),
         (format!("{member}[draw]\nslip = [0.9, 100]"), "draw.slip[1]: 100; must lie in 0..10"),
         (
             format!("{member}[[vehicle]]\nfile = \"us_wb62\"\nloads = {{ empty = 1 }}\nshare = 0.0001"),

@@ -9,7 +9,7 @@ use glam::DVec2;
 use serde::Deserialize;
 
 use super::{Arm, Edges, Ground, Hand, Kerb, Line};
-use crate::files::reader::{Error, Reader};
+use crate::files::reader::{Error, Exactly, Reader};
 use crate::geometry::area::signed_area;
 use crate::geometry::{Curve, Outline, Piece, arc_of_height};
 use crate::map::apron::{self, crosses};
@@ -33,7 +33,7 @@ struct Written {
     #[serde(default)]
     hand: Hand,
     #[serde(default)]
-    origin: [f64; 2],
+    origin: Exactly<f64, 2>,
     island_radius: f64,
     outer_radius: f64,
     lane_radii: Vec<f64>,
@@ -69,8 +69,8 @@ struct WrittenRoute {
     lane: Lane,
     exit: u32,
     to: String,
-    crossing: [f64; 2],
-    widths: [f64; 3],
+    crossing: Exactly<f64, 2>,
+    widths: Exactly<f64, 3>,
     path: Vec<Vec<f64>>,
 }
 
@@ -207,16 +207,25 @@ impl Ground {
             if lines.iter().any(|line| (line.entry, line.lane, line.exit) == (entry, lane, exit)) {
                 return Err(reader.invalid(key("exit"), exit, "an earlier route has this entry, lane and exit"));
             }
-            let [left, right] = route.crossing;
+            let Exactly([left, right]) = route.crossing;
             let crossing = (
                 reader.within(&key("crossing[0]"), left, 0.5..=50.0, "m")?,
                 reader.within(&key("crossing[1]"), right, 0.5..=50.0, "m")?,
             );
-            for width in route.widths {
+            for width in route.widths.0 {
                 reader.within(&key("widths"), width, 1.0..=20.0, "m")?;
             }
             let line = curve(&reader, &key("path"), &route.path, false)?;
-            lines.push(Line { entry, lane, exit, exit_arm, line, crossing, widths: route.widths, ends: [None, None] });
+            lines.push(Line {
+                entry,
+                lane,
+                exit,
+                exit_arm,
+                line,
+                crossing,
+                widths: route.widths.0,
+                ends: [None, None],
+            });
         }
         lines.sort_by_key(|line| (line.entry, line.lane == Lane::Right, line.exit));
         reader.count("lane", written.lane.len(), 0..=1000)?;

@@ -61,7 +61,7 @@ struct Course {
 impl Arm {
     pub(super) fn drawn(keys: &Keys, draws: &Draws, ring: &Ring, arm: usize) -> Result<Arm, Reason> {
         let place = Place::Arm(arm);
-        let length = millimetres(ring.outer + draws.within(place, Q::Length, keys.arms.length));
+        let length = millimetres(ring.outer + draws.within(place, Q::Length, *keys.arms.length));
         let course = course(keys, draws, ring, arm);
         let way = |place: Place, side: f64| carriageway(keys, draws, ring, &course, arm, place, side, length);
         Ok(Arm { length, entry: way(Place::Entry(arm), 1.0)?, exit: way(Place::Exit(arm), -1.0)? })
@@ -99,7 +99,7 @@ impl Arm {
         };
         // Corners that hardly turn would be arcs of millimetres.
         let corners = (0..n).filter(|&index| LEAST_TURN < turn(index)).map(|index| around[index]);
-        let radius = millimetres(draws.within(place, Q::SplitterRadius, keys.splitters.corner_radius));
+        let radius = millimetres(draws.within(place, Q::SplitterRadius, *keys.splitters.corner_radius));
         let corner =
             |at: DVec2| WrittenPoint { along: millimetres(at.x), offset: millimetres(at.y), radius: Some(radius) };
         corners.map(corner).collect()
@@ -113,17 +113,17 @@ fn course(keys: &Keys, draws: &Draws, ring: &Ring, arm: usize) -> Course {
         false => 0.0,
     };
     let median = match draws.happens(place, Q::HasMedian, keys.median.share) {
-        true => draws.within(place, Q::Median, keys.median.half_width),
+        true => draws.within(place, Q::Median, *keys.median.half_width),
         false => 0.0,
     };
     let mut room = keys.s_bend.end - BETWEEN;
     let mut s_bend = None;
     if draws.happens(place, Q::HasSBend, keys.s_bend.share) {
-        let shift = draws.within(place, Q::Shift, keys.s_bend.shift);
+        let shift = draws.within(place, Q::Shift, *keys.s_bend.shift);
         let side = if draws.happens(place, Q::ShiftSide, 0.5) { -1.0 } else { 1.0 };
         // The S-bend takes its length and its bends' tangents, and leaves room for the last bend.
         let longest = (keys.s_bend.end - keys.bend.before_ring[0] - 6.0) / (1.0 + 2.0 * S_TANGENT);
-        let [least, most] = keys.s_bend.length;
+        let [least, most] = *keys.s_bend.length;
         if least < longest {
             let length = draws.within(place, Q::SBendLength, [least, most.min(longest)]);
             let outer = ring.outer + keys.s_bend.end - S_TANGENT * length - 2.0;
@@ -169,28 +169,28 @@ fn carriageway(
             bends.extend(axis.beside(-half_width).ok_or(Reason::TooSharp)?.bends);
         }
     }
-    let [nearest, farthest] = keys.bend.before_ring;
+    let [nearest, farthest] = *keys.bend.before_ring;
     let before_ring = draws.within(place, Q::BeforeRing, [nearest, farthest.min(course.room).max(nearest)]);
     let last = ring.outer + before_ring;
     let mut y = beside + half_width;
     if draws.happens(Place::Arm(arm), Q::IsWidened, keys.widening.share) {
-        let [least, most] = keys.widening.length;
+        let [least, most] = *keys.widening.length;
         let most = most.min(course.room - before_ring - BETWEEN);
         if least <= most {
             let length = draws.within(Place::Arm(arm), Q::WideningLength, [least, most]);
-            bends.push(bend(last + length, y, draws.within(place, Q::WideningRadius, keys.bend.radius)));
-            y += draws.within(Place::Arm(arm), Q::Widening, keys.widening.width);
+            bends.push(bend(last + length, y, draws.within(place, Q::WideningRadius, *keys.bend.radius)));
+            y += draws.within(Place::Arm(arm), Q::Widening, *keys.widening.width);
         }
     }
-    bends.push(bend(last, y, draws.within(place, Q::BendRadius, keys.bend.radius)));
+    bends.push(bend(last, y, draws.within(place, Q::BendRadius, *keys.bend.radius)));
     let from = DVec2::new(last, y);
     let (angle, [least, most]) = if draws.happens(place, Q::IsStraight, keys.straight.share) {
         let angle = keys.straight.angle_deg + keys.straight.angle_deviation_deg * draws.normal(place, Q::Angle);
-        (angle.to_radians(), keys.straight.kerb_arc)
+        (angle.to_radians(), *keys.straight.kerb_arc)
     } else {
         // The angle at which the straight passes the ring's centre at the distance drawn.
-        let passes = ring.outer * draws.within(place, Q::Aim, keys.flared.aim);
-        ((passes / from.length()).min(1.0).asin() - from.to_angle(), keys.flared.kerb_arc)
+        let passes = ring.outer * draws.within(place, Q::Aim, *keys.flared.aim);
+        ((passes / from.length()).min(1.0).asin() - from.to_angle(), *keys.flared.kerb_arc)
     };
     let direction = DVec2::new(-angle.cos(), angle.sin());
     let mut kerb = Line { bends, direction, ring_radius: least };

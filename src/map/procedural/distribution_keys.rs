@@ -4,10 +4,10 @@ use std::ops::RangeInclusive;
 
 use serde::Deserialize;
 
-use crate::files::reader::{Error, Reader, shown};
+use crate::files::reader::{Error, Exactly, Reader, shown};
 
 /// Least and greatest value that is drawn.
-pub(super) type Range = [f64; 2];
+pub(super) type Range = Exactly<f64, 2>;
 
 /// The file. After [`Keys::check`] every value lies in its range; angles stay in degrees, as roundabout files have
 /// them.
@@ -38,7 +38,7 @@ pub(super) struct Keys {
 pub(super) struct Ring {
     /// Weights of rings of one, two and three lanes.
     #[serde(default = "two_lanes")]
-    pub(super) lanes: [f64; 3],
+    pub(super) lanes: Exactly<f64, 3>,
     /// Log-uniform (m).
     pub(super) island_radius: Range,
     /// Islands below this radius are `small_weight` times as frequent as log-uniform draws would have them (m).
@@ -54,8 +54,8 @@ pub(super) struct Ring {
     pub(super) apron: Option<Range>,
 }
 
-fn two_lanes() -> [f64; 3] {
-    [0.0, 1.0, 0.0]
+fn two_lanes() -> Exactly<f64, 3> {
+    Exactly([0.0, 1.0, 0.0])
 }
 
 /// A ring of one lane: its own island and lane, so wide that a truck gets around.
@@ -73,7 +73,7 @@ pub(super) struct Single {
 #[serde(deny_unknown_fields)]
 pub(super) struct Arms {
     /// Of three, four and five arms.
-    pub(super) shares: [f64; 3],
+    pub(super) shares: Exactly<f64, 3>,
     /// Outer radius of the ring below which there are no five arms (m).
     pub(super) five_from: f64,
     pub(super) gap_variation: f64,
@@ -234,7 +234,7 @@ impl Keys {
         if let Some(apron) = ring.apron {
             range(reader, "ring.apron", apron, 0.0..=50.0, "m")?;
         }
-        weights(reader, "ring.lanes", &ring.lanes)?;
+        weights(reader, "ring.lanes", &*ring.lanes)?;
         match single {
             Some(single) => {
                 range(reader, "single.island_radius", single.island_radius, 1.5..=200.0, "m")?;
@@ -287,7 +287,7 @@ impl Keys {
             reader.within(key, value, limits, unit)?;
         }
         reader.within("rules.truck_width", rules.truck_width, 1.0..=4.0, "m")?;
-        weights(reader, "arms.shares", &arms.shares)?;
+        weights(reader, "arms.shares", &*arms.shares)?;
         reader.count("corners.shares", corners.shares.len(), 1..=16)?;
         for (index, &share) in corners.shares.iter().enumerate() {
             reader.within(&format!("corners.shares[{index}]"), share, 0.0..=1.0, "")?;
@@ -311,7 +311,13 @@ impl Keys {
 }
 
 /// A range within `limits`, in order.
-fn range(reader: &Reader, key: &str, [low, high]: Range, limits: RangeInclusive<f64>, unit: &str) -> Result<(), Error> {
+fn range(
+    reader: &Reader,
+    key: &str,
+    Exactly([low, high]): Range,
+    limits: RangeInclusive<f64>,
+    unit: &str,
+) -> Result<(), Error> {
     reader.within(key, low, limits.clone(), unit)?;
     reader.within(key, high, limits, unit)?;
     if low <= high {

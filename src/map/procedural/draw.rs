@@ -9,6 +9,7 @@ use super::arm::{Arm, Ring};
 use super::distribution_keys::Keys;
 use super::draws::{Draws, Place, Quantity as Q};
 use super::line::{Line, millimetres};
+use crate::files::reader::Exactly;
 use crate::map::ground::Hand;
 use crate::map::parametric::written::{BEHIND_APRON, Written, WrittenArm, WrittenCorner, WrittenRing};
 
@@ -51,10 +52,10 @@ pub(super) fn drawn(keys: &Keys, draws: &Draws) -> Result<Written, Reason> {
 /// The ring as a file has it, and what the arms need of it.
 fn ring(keys: &Keys, draws: &Draws) -> (WrittenRing, Ring) {
     let place = Place::Ring;
-    let gutter = millimetres(draws.within(place, Q::Gutter, keys.ring.gutter));
-    let lanes = 1 + draws.index(place, Q::RingLanes, &keys.ring.lanes);
+    let gutter = millimetres(draws.within(place, Q::Gutter, *keys.ring.gutter));
+    let lanes = 1 + draws.index(place, Q::RingLanes, &*keys.ring.lanes);
     let (island, narrowest) = match keys.single.as_ref().filter(|_| lanes == 1) {
-        Some(single) => (draws.log_within(place, Q::IslandRadius, single.island_radius), keys.ring.lane_width[0]),
+        Some(single) => (draws.log_within(place, Q::IslandRadius, *single.island_radius), keys.ring.lane_width[0]),
         None => island(keys, draws),
     };
     let (island, lane_width) =
@@ -62,7 +63,7 @@ fn ring(keys: &Keys, draws: &Draws) -> (WrittenRing, Ring) {
     let ring_lane_width = match keys.single.as_ref().filter(|_| lanes == 1) {
         Some(single) => {
             let needed = single.outer_radius - island - 2.0 * gutter;
-            millimetres(draws.within(place, Q::RingLaneWidth, single.lane_width).max(needed).min(single.lane_width[1]))
+            millimetres(draws.within(place, Q::RingLaneWidth, *single.lane_width).max(needed).min(single.lane_width[1]))
         }
         None => lane_width,
     };
@@ -72,7 +73,7 @@ fn ring(keys: &Keys, draws: &Draws) -> (WrittenRing, Ring) {
         gutter,
         lane_width: ring_lane_width,
         lanes: (lanes != 2).then_some(lanes),
-        apron: keys.ring.apron.map(|[least, most]| {
+        apron: keys.ring.apron.map(|Exactly([least, most])| {
             let room = island - BEHIND_APRON;
             millimetres(draws.within(place, Q::Apron, [least.min(room), most.min(room)]))
         }),
@@ -85,7 +86,7 @@ fn ring(keys: &Keys, draws: &Draws) -> (WrittenRing, Ring) {
 /// Radius of the island of a ring of two or three lanes, and the least width of its lanes (m).
 fn island(keys: &Keys, draws: &Draws) -> (f64, f64) {
     let ring = &keys.ring;
-    let [least, most] = ring.island_radius;
+    let [least, most] = *ring.island_radius;
     // Log-uniform below the small radius, and above.
     let middle = ring.small_radius.clamp(least, most);
     let weights = [ring.small_weight * (middle / least).ln(), (most / middle).ln()];
@@ -94,13 +95,13 @@ fn island(keys: &Keys, draws: &Draws) -> (f64, f64) {
         true => least * (fraction / ring.small_weight).exp(),
         false => middle * (fraction - weights[0]).exp(),
     };
-    let [narrowest, widest] = ring.lane_width;
+    let [narrowest, widest] = *ring.lane_width;
     (island, if island < ring.narrow_radius { narrowest.max(ring.narrow_lane_width).min(widest) } else { narrowest })
 }
 
 /// Bearings of the arms in hundredths of a degree, counter-clockwise from the first (deg).
 fn bearings(keys: &Keys, draws: &Draws, ring: &Ring) -> Result<Vec<f64>, Reason> {
-    let mut shares = keys.arms.shares;
+    let mut shares = *keys.arms.shares;
     if ring.outer < keys.arms.five_from && 0.0 < shares[0] + shares[1] {
         shares[2] = 0.0;
     }
@@ -147,7 +148,7 @@ fn corner_radius(
     let half = -angle / 2.0;
     let fits = 0.98 * (reach - entry.tangent()).min(reach_back - exit.tangent()) / half.tan();
     let outside = (ring.outer - corner.length()) / (1.0 / half.cos() - 1.0);
-    let [least, most] = keys.corners.kerb_radius;
+    let [least, most] = *keys.corners.kerb_radius;
     let (least, most) = (least.max(outside), most.min(fits));
     (least < most).then(|| millimetres(draws.log_within(Place::Arm(arm), Q::CornerRadius, [least, most])))
 }

@@ -1,7 +1,6 @@
 //! Numbers for one attempt at a road: each is a function of (seed, road, attempt, place, quantity) alone, so a new
 //! quantity shifts no other.
 
-use super::distribution_keys::Range;
 use crate::layout::random;
 
 /// What is drawn. A quantity keeps its number for ever: roads are the same as long as it does.
@@ -94,12 +93,12 @@ impl Draws {
     }
 
     /// Uniform.
-    pub(super) fn within(&self, place: Place, quantity: Quantity, [low, high]: Range) -> f64 {
+    pub(super) fn within(&self, place: Place, quantity: Quantity, [low, high]: [f64; 2]) -> f64 {
         low + (high - low) * self.unit(place, quantity)
     }
 
     /// Log-uniform: a factor of two is equally likely everywhere.
-    pub(super) fn log_within(&self, place: Place, quantity: Quantity, [low, high]: Range) -> f64 {
+    pub(super) fn log_within(&self, place: Place, quantity: Quantity, [low, high]: [f64; 2]) -> f64 {
         low * (high / low).powf(self.unit(place, quantity))
     }
 

@@ -4,12 +4,15 @@ use std::ops::RangeInclusive;
 use std::path::Path;
 
 use super::{Fleet, Member, N_VEHICLES, Ranges};
-use crate::files::reader::{Error, Reader};
+use crate::files::reader::{Error, Exactly, Reader};
 use crate::files::shipped::{Kind, Source};
 use crate::scenario::benchmark_keys::{Written, WrittenDraw, WrittenMember, WrittenVehicles};
 use crate::scenario::check::{Invalid, check_vehicle, within};
 use crate::scenario::referred::referred;
-use crate::vehicle::{CENTRE_OF_GRAVITY, LEAST_LEVER, TRACTOR_WHEELBASE, TRAILER_WHEELBASE, Vehicle, read_model};
+use crate::vehicle::{
+    CENTRE_OF_GRAVITY, KINGPIN_TO_FRONT, KINGPIN_TO_REAR, LEAST_LEVER, TRACTOR_WHEELBASE, TRAILER_WHEELBASE, Vehicle,
+    read_model,
+};
 
 /// Maximum number of rows of a table of vehicles: they take about 45 MB with a chassis each.
 const MOST_VEHICLES: usize = 65_536;
@@ -94,8 +97,8 @@ fn member(reader: &Reader, source: &Source, key: &str, written: &WrittenMember) 
 /// The fleet, whose vehicles make sense whatever is drawn.
 fn drawn(reader: &Reader, members: Vec<Member>, written: &WrittenDraw) -> Result<Fleet, Error> {
     let n_vehicles = reader.count("draw.n_vehicles", written.n_vehicles.unwrap_or(N_VEHICLES), 1..=MOST_VEHICLES)?;
-    let range = |key: &str, range: Option<[f64; 2]>, [least, greatest]: [f64; 2], unit: &str| {
-        let Some(range) = range else { return Ok(None) };
+    let range = |key: &str, range: Option<Exactly<f64, 2>>, [least, greatest]: [f64; 2], unit: &str| {
+        let Some(Exactly(range)) = range else { return Ok(None) };
         for (index, end) in range.into_iter().enumerate() {
             reader.within(&format!("draw.{key}[{index}]"), end, least..=greatest, unit)?;
         }
@@ -156,6 +159,10 @@ fn check_drawn(vehicle: &Vehicle) -> Result<(), Invalid> {
     within("trailer.wheelbase", trailer.wheelbase, longer(TRAILER_WHEELBASE))?;
     within("model.slip_lever", vehicle.model.slip_lever, [0.0, trailer.wheelbase - LEAST_LEVER])?;
     within("tractor.fifth_wheel", tractor.fifth_wheel, [-nearer, nearer])?;
+    within("trailer.kingpin_to_rear", trailer.kingpin_to_rear, longer(KINGPIN_TO_REAR))?;
+    let sensors = &vehicle.sensors;
+    let longest = KINGPIN_TO_FRONT.end() + KINGPIN_TO_REAR.end() + MOST_LONGER;
+    within("sensors.trailer_last", sensors.trailer_last, [sensors.trailer_first, longest])?;
     let loads = vehicle.loads.iter().map(|(name, load)| (format!("loads.{name}"), &load.suspension));
     let units = std::iter::once(("tractor".to_owned(), &tractor.suspension)).chain(loads);
     for (unit, suspension) in units {
