@@ -19,12 +19,14 @@ pub use model::{Model, SLIP_LEVER};
 pub use single_track::{SingleTrack, Steady};
 pub use suspension::Suspension;
 pub(crate) use vehicle_keys::{
-    CENTRE_OF_GRAVITY, LEAST_LEVER, TRACTOR_WHEELBASE, TRAILER_WHEELBASE, WrittenModel, model as read_model,
+    CENTRE_OF_GRAVITY, KINGPIN_TO_FRONT, KINGPIN_TO_REAR, LEAST_LEVER, TRACTOR_WHEELBASE, TRAILER_WHEELBASE,
+    WrittenModel, model as read_model,
 };
 
 use crate::files::reader::Error;
 use crate::files::shipped::{Kind, Source};
 use crate::layout::{Body, Lag, N_RAYS, N_TRACTOR_RAYS, N_TRAILER_RAYS, Ray, Rig};
+use crate::map::Road;
 
 /// Acceleration of free fall (m/s^2).
 pub const GRAVITY: f64 = 9.81;
@@ -215,6 +217,15 @@ impl Vehicle {
         let middle = 0.5 * self.tractor.wheelbase;
         self.tractor.wheelbase += length;
         self.sensors.tractor_mounts.iter_mut().filter(|mount| middle < mount.x).for_each(|mount| mount.x += length);
+    }
+
+    /// The vehicle on a road as it lies in the world: one that is driven as its mirror image tilts to the other side.
+    pub fn seen_on(&self, road: &Road) -> Vehicle {
+        let mut vehicle = self.clone();
+        if road.is_mirrored() {
+            vehicle.model.crossfall = -vehicle.model.crossfall;
+        }
+        vehicle
     }
 
     /// Mass of tractor, trailer and load (kg).

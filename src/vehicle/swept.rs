@@ -50,8 +50,10 @@ struct Towing {
     wheelbase: f64,
     fifth_wheel: f64,
     trailer_wheelbase: f64,
-    /// Length by which slip moves a unit's turning point ahead (m).
+    /// Slip of the tyres (rad/(m/s^2)).
     slip: f64,
+    /// Most by which slip moves a unit's turning point ahead (m).
+    slip_lever_max: f64,
     /// Length by which each (m/s)² lengthens the wheelbase as which the tractor steers (s²/m).
     understeer: f64,
 }
@@ -73,20 +75,32 @@ impl Towing {
     fn of(rig: &Rig, speed: f64) -> Towing {
         let wheelbase = f64::from(rig.wheelbase);
         let (fifth_wheel, trailer_wheelbase) = (f64::from(rig.fifth_wheel), f64::from(rig.trailer_wheelbase));
-        // The same bound as in the simulator's equations, and another that keeps the tractor's lever positive.
-        let slip = (f64::from(rig.slip) * speed * speed).min(rig.slip_lever_max.into()).min(0.8 * wheelbase);
-        Towing { speed, wheelbase, fifth_wheel, trailer_wheelbase, slip, understeer: rig.understeer.into() }
+        let (slip, slip_lever_max) = (f64::from(rig.slip), f64::from(rig.slip_lever_max));
+        let understeer = rig.understeer.into();
+        Towing { speed, wheelbase, fifth_wheel, trailer_wheelbase, slip, slip_lever_max, understeer }
+    }
+
+    /// Length by which slip moves the turning point of a unit ahead whose axles have this speed along it (m/s) (m).
+    fn slip_lever(&self, along: f64) -> f64 {
+        (self.slip * along * along.abs()).clamp(-self.slip_lever_max, self.slip_lever_max)
+    }
+
+    /// Distance from the tractor's turning point to its front axle where its drive axle has this speed (m/s) (m).
+    fn tractor_lever(&self, along: f64) -> f64 {
+        // A bound that the simulator does not need, as there the wheels steer: it keeps the lever positive.
+        self.wheelbase - self.slip_lever(along).min(0.8 * self.wheelbase)
     }
 
     /// Motion where the front axle moves in a direction relative to the tractor, at an articulation (rad).
     fn turning(&self, direction: f64, articulation: f64) -> Turning {
-        let Towing { speed, wheelbase, fifth_wheel, trailer_wheelbase, slip, .. } = *self;
-        let along = speed * direction.cos();
-        let yaw = speed * direction.sin() / (wheelbase - slip);
+        let along = self.speed * direction.cos();
+        let lever = self.tractor_lever(along);
+        let yaw = self.speed * direction.sin() / lever;
         let (sin, cos) = articulation.sin_cos();
-        let hitch = (fifth_wheel - slip) * yaw;
-        let trailer_yaw = (along * sin + hitch * cos) / (trailer_wheelbase - slip);
-        Turning { along, yaw, trailer_along: along * cos - hitch * sin, trailer_yaw }
+        let hitch = (self.fifth_wheel - (self.wheelbase - lever)) * yaw;
+        let trailer_along = along * cos - hitch * sin;
+        let trailer_yaw = (along * sin + hitch * cos) / (self.trailer_wheelbase - self.slip_lever(trailer_along));
+        Turning { along, yaw, trailer_along, trailer_yaw }
     }
 }
 
@@ -105,8 +119,9 @@ pub fn corners(body: &Body, origin: DVec2, heading: f64) -> [DVec2; 4] {
 /// Poses every `spacing` metres of a truck whose front axle runs along `centre_line` at `speed`; both units start in
 /// line with it.
 ///
-/// The front axle's velocity points along the line; slip moves the tractor's turning point ahead by `slip * speed^2`,
-/// which shortens the lever of the turn, as in the single-track equations of [`crate::engine::cpu::drive`].
+/// The front axle's velocity points along the line; slip moves each unit's turning point ahead by `slip` times the
+/// square of its axles' own speed, which shortens the lever of the turn, as in the single-track equations of
+/// [`crate::engine::cpu::drive`].
 pub fn swept_path(rig: &Rig, centre_line: &Curve, speed: f64, spacing: f64) -> Vec<Pose> {
     let towing = Towing::of(rig, speed);
     let Towing { wheelbase, fifth_wheel, trailer_wheelbase, .. } = towing;

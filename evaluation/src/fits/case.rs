@@ -74,6 +74,8 @@ impl Case {
         let (approach, departure) = straights(road, vehicle)?;
         let mut scenario = Scenario::named(BASE)?;
         scenario.vehicle = vehicle.clone();
+        // A delay moves what is asked of the steering, not what can be driven, and may be longer than a step allows.
+        scenario.vehicle.model.steer_delay = 0.0;
         scenario.load = asked.load.clone();
         scenario.gutter = asked.gutter;
         scenario.steer_levels = STEER_LEVELS.to_vec();
@@ -95,6 +97,8 @@ impl Case {
         let place = &scenario.places[0];
         let road = place.roundabout.seen();
         let speed = asked.speed_kmh / 3.6;
+        // The lane's centre line is followed as it lies.
+        let vehicle = scenario.vehicle.seen_on(&place.roundabout);
         Case {
             vehicle: name.to_owned(),
             kerbs: road.unit_kerbs_beyond_ends(asked.gutter),
@@ -104,7 +108,7 @@ impl Case {
             asked: asked.clone(),
             world,
             grown: grown.into(),
-            rig: scenario.vehicle.rig(&asked.load, (SPACING / speed) as f32, None),
+            rig: vehicle.rig(&asked.load, (SPACING / speed) as f32, None),
             step: scenario.step,
         }
     }
@@ -360,6 +364,23 @@ mod tests {
         }
         let unused = answered_on(with_apron(0.5), "E-right-1", "daf_xf", 0.0, false);
         assert_eq!(unused.shown().apron_use(), Some(0.0));
+    }
+
+    #[test]
+    fn a_road_that_tilts_and_its_mirror_image_ask_for_the_same_and_a_delay_of_the_steering_for_nothing() {
+        let ratio = |is_mirrored: bool, route: &str, crossfall: f64, steer_delay: f64| {
+            let ground = Ground { mirrored: is_mirrored, ..Road::named("16m").unwrap().ground().clone() };
+            let road = Road::on("16m".into(), ground);
+            let mut vehicle = Vehicle::named("daf_xf").unwrap();
+            (vehicle.model.crossfall, vehicle.model.steer_delay) = (crossfall, steer_delay);
+            let (load, gutter) = ("laden".into(), Gutter::Drivable);
+            let asked = Asked { load, speed_kmh: 30.0, clearance: 0.0, gutter, widths: vec![8] };
+            let scenario = Case::scenario(&asked, &road, &vehicle).unwrap();
+            let case = Case::new(&asked, "daf_xf", &scenario, Arc::new(World::bake(&scenario).unwrap()));
+            case.on_centre(wanted(&case.routes, &[route.to_owned()])[0]).1.load_transfer_ratio
+        };
+        let [one, other] = [ratio(false, "E-left-2", 0.1, 0.0), ratio(true, "E-right-2", 0.1, 0.3)];
+        assert!((one - other).abs() < 1e-6 && 1e-2 < (one - ratio(false, "E-left-2", 0.0, 0.0)).abs(), "{one} {other}");
     }
 
     #[test]

@@ -95,7 +95,7 @@ impl Limit {
 pub fn demands(rig: &Rig, centre_line: &Curve, path: &[Pose], speed: f64, spacing: f64) -> Vec<Demand> {
     let towing = Towing::of(rig, speed);
     let fall = f64::from(rig.crossfall);
-    let (mut tractor, mut trailer) = (Rolling::default(), Rolling::default());
+    let (mut tractor, mut trailer) = (Rolling::on(&rig.tractor_roll, fall), Rolling::on(&rig.trailer_roll, fall));
     let mut before: Option<f64> = None;
     let demand = |(index, pose): (usize, &Pose)| {
         let station = index as f64 * spacing;
@@ -105,11 +105,11 @@ pub fn demands(rig: &Rig, centre_line: &Curve, path: &[Pose], speed: f64, spacin
         let steer_rate = (steering - before.unwrap_or(steering)) * speed / spacing;
         before = Some(steering);
         let lateral_acceleration = turning.along * turning.yaw;
-        let ratios = [
-            tractor.next(&rig.tractor_roll, lateral_acceleration + fall),
-            trailer.next(&rig.trailer_roll, turning.trailer_along * turning.trailer_yaw + fall),
-        ];
-        let load_transfer_ratio = if ratios[0].abs() < ratios[1].abs() { ratios[1] } else { ratios[0] };
+        let own = tractor.next(&rig.tractor_roll, lateral_acceleration + fall);
+        let trailers = trailer.next(&rig.trailer_roll, turning.trailer_along * turning.trailer_yaw + fall);
+        // The trailer leans on the tractor by the fifth wheel.
+        let tractors = own + f64::from(rig.fifth_wheel_load) * (trailers - own);
+        let load_transfer_ratio = if tractors.abs() < trailers.abs() { trailers } else { tractors };
         Demand { station, steering, steer_rate, lateral_acceleration, load_transfer_ratio }
     };
     path.iter().enumerate().map(demand).collect()
@@ -132,11 +132,11 @@ fn steer_angle(towing: &Towing, direction: f64) -> f64 {
     let along = towing.speed * cos;
     let steered = towing.wheelbase + towing.understeer * along * along;
     let steered = steered.max(f64::from(WHEELBASE_MIN) * towing.wheelbase);
-    (steered * sin).atan2((towing.wheelbase - towing.slip) * cos)
+    (steered * sin).atan2(towing.tractor_lever(along) * cos)
 }
 
-/// Roll of a unit along the path; it begins at rest.
-#[derive(Debug, Clone, Copy, Default)]
+/// Roll of a unit along the path.
+#[derive(Debug, Clone, Copy)]
 struct Rolling {
     angle: f64,
     rate: f64,
@@ -144,6 +144,12 @@ struct Rolling {
 }
 
 impl Rolling {
+    /// At rest, on a road that tilts by so much (m/s^2).
+    fn on(roll: &Roll, fall: f64) -> Rolling {
+        let angle = -f64::from(roll.input[1]) * fall / f64::from(roll.transition[2]);
+        Rolling { angle, rate: 0.0, lateral_acceleration: fall }
+    }
+
     /// The load transfer ratio one interval later, with this lateral acceleration there (m/s^2).
     fn next(&mut self, roll: &Roll, lateral_acceleration: f64) -> f64 {
         let mean = 0.5 * (self.lateral_acceleration + lateral_acceleration);

@@ -3,9 +3,12 @@
 use std::f32::consts::FRAC_PI_2;
 use std::path::Path;
 
-use glam::Vec2;
-use offtrack::layout::{N_RAYS, N_TRAILER_RAYS};
+use glam::{DVec2, Vec2};
+use offtrack::geometry::Curve;
+use offtrack::layout::{N_RAYS, N_TRAILER_RAYS, Truck};
+use offtrack::physics::motion_of;
 use offtrack::vehicle::Vehicle;
+use offtrack::vehicle::swept::{demands, swept_path};
 
 use super::{VEHICLES, vehicle, vehicle_file};
 
@@ -152,4 +155,32 @@ fn a_file_can_move_its_sensors() {
     assert_eq!(rays[0].origin.x, front - 1.0);
     assert_eq!(rays[14].origin.x, front - 8.0);
     assert_eq!(rays[N_TRAILER_RAYS].origin, Vec2::new(4.5, 1.2));
+}
+
+#[test]
+fn on_a_circle_that_the_front_axle_follows_both_units_turn_as_in_a_step() {
+    const SPACING: f64 = 0.25;
+    let mut vehicle = vehicle("daf_xf");
+    vehicle.model.slip_lever = 4.0;
+    for (load, radius, kmh) in [("laden", 12.0, 15.0), ("laden", 12.0, 20.0), ("empty", 20.0, 30.0)] {
+        let speed = kmh / 3.6;
+        let rig = vehicle.rig(load, (SPACING / speed) as f32, None);
+        let circle = Curve::circle(DVec2::ZERO, radius);
+        let line = Curve { pieces: [circle.pieces.clone(), circle.pieces].concat() };
+        let path = swept_path(&rig, &line, speed, SPACING);
+        let last = *demands(&rig, &line, &path, speed, SPACING).last().unwrap();
+        let pose = path.last().unwrap();
+        let truck = Truck {
+            heading: pose.heading as f32,
+            trailer_heading: pose.trailer_heading as f32,
+            steering: last.steering as f32,
+            speed: (speed * (line.heading_at(last.station) - pose.heading).cos()) as f32,
+            ..Truck::default()
+        };
+        let motion = motion_of(&rig, &truck);
+        // In a steady turn both turn at the rate of the front axle on its circle.
+        let yaw = (speed / radius) as f32;
+        assert!((motion.yaw_rate - yaw).abs() < 1e-3 && (motion.trailer_yaw_rate - yaw).abs() < 1e-3, "{motion:?}");
+        assert!((motion.lateral_acceleration - last.lateral_acceleration as f32).abs() < 1e-2, "{motion:?}");
+    }
 }
