@@ -23,7 +23,7 @@ pub(super) fn placed(mut kerbs: Vec<Curve>, drawn: Vec<Curve>) -> (Vec<Curve>, V
 }
 
 /// Whether an edge is drawn where another line is.
-fn coincides(edge: &Curve, other: &Curve) -> bool {
+pub(super) fn coincides(edge: &Curve, other: &Curve) -> bool {
     let near = |(one, other): (&Curve, &Curve)| one.polyline(GAP).into_iter().all(|p| other.distance(p) < GAP);
     [(edge, other), (other, edge)].into_iter().all(near)
 }

@@ -83,6 +83,7 @@ impl Drawing {
     pub(super) fn parse(file: &Path, text: &str, layers: &Layers) -> Result<Drawing, Error> {
         let pairs = pairs(file, text)?;
         let unit = unit(file, &pairs, layers)?;
+        check_whole(file, &pairs)?;
         let entities = section(&pairs, "ENTITIES");
         let blocks = drawn_blocks(&pairs, layers);
         let reader = Reader::of(file);
@@ -186,6 +187,18 @@ fn unit(file: &Path, pairs: &[Pair], layers: &Layers) -> Result<Unit, Error> {
     })
 }
 
+/// An error where the file ends within a section: a copy that was cut lacks kerbs.
+fn check_whole(file: &Path, pairs: &[Pair]) -> Result<(), Error> {
+    let n = |value: &str| pairs.iter().filter(|pair| pair.code == 0 && pair.value == value).count();
+    match pairs.last() {
+        Some(last) if n("ENDSEC") < n("SECTION") => {
+            let expected = "ends within a section, without ENDSEC: is the file whole?";
+            Err(Reader::of(file).invalid(format!("line {}", last.line), last.value, expected))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// The entities of a section, each from its code 0 on.
 fn section<'a, 'b>(pairs: &'b [Pair<'a>], name: &str) -> Vec<&'b [Pair<'a>]> {
     let begin = pairs
@@ -246,6 +259,9 @@ fn curve(file: &Path, entity: &[Pair], vertices: &[&[Pair]], metres: f64) -> Res
     // An extrusion downwards mirrors what is drawn.
     if number(entity, 230)?.is_some_and(|z| z < 0.0) {
         return Err(refused("is drawn from below (extrusion 0, 0, -1): flatten it"));
+    }
+    if number(entity, 230)?.is_some_and(|z| z < 0.9999) {
+        return Err(refused("is drawn in a tilted plane (extrusion): flatten it"));
     }
     let (curve, is_closed) = match kind {
         "LINE" => {

@@ -30,6 +30,10 @@ const MOST_WAYS: usize = 128;
 const MOST_APRONS: usize = 200;
 /// A way comes nearer to the ring than both of its ends by so much at least (m).
 const NEARER: f64 = 1.0;
+/// A way that is drawn backwards leads around the island by so much at least, the other way round than others (rad).
+const BACKWARDS: f64 = 0.3;
+/// Lines that cross do so farther than this from their ends (m).
+const FROM_ENDS: f64 = 0.01;
 /// Farthest that an island may be from a circle, as a fraction of its radius.
 const ROUND: f64 = 0.3;
 
@@ -69,6 +73,10 @@ pub(super) fn drawn(file: &Path, drawing: Drawing, layers: &Layers) -> Result<Dr
     }
     let outer = outer_radius(&faces, radius);
     for (way, drawn) in ways.iter().zip(&lanes) {
+        if turn_about_centre(way) < -BACKWARDS {
+            let expected = "leads the other way round the island than others do: reverse it";
+            return Err(reader.invalid(&drawn.place, "backwards", expected));
+        }
         check_way(&reader, way, drawn, outer)?;
         if let Some((distance, at)) = closest(way, &faces) {
             let at = centre + if mirrored { DVec2::new(at.x, -at.y) } else { at };
@@ -113,7 +121,7 @@ fn closed(reader: &Reader, drawn: Vec<Entity>, layer: &str, notes: &mut Vec<Stri
     }
     for one in drawn {
         let (start, end) = ends(&one.curve);
-        if one.is_closed || meets(start, end) { loops.push(one.curve) } else { open.push(one) }
+        if one.is_closed || meets(start, end) { loops.push((one.place, one.curve)) } else { open.push(one) }
     }
     let n_open = open.len();
     while let Some(Entity { mut curve, place, .. }) = open.pop() {
@@ -137,12 +145,44 @@ fn closed(reader: &Reader, drawn: Vec<Entity>, layer: &str, notes: &mut Vec<Stri
             let other = if meets(end, ends(&other).0) { other } else { other.reversed() };
             curve.pieces.extend(other.pieces);
         }
-        loops.push(curve);
+        loops.push((place, curve));
     }
     if 0 < n_open {
         notes.push(format!("{n_open} open lines on layer {layer} are joined to closed outlines"));
     }
-    Ok(loops)
+    let mut kept: Vec<Curve> = Vec::new();
+    for (place, curve) in loops {
+        if let Some(at) = crosses_itself(&curve) {
+            let expected = format!("the outline crosses itself at ({:.3}, {:.3}) m", at.x, at.y);
+            return Err(reader.invalid(place, "crosses itself", expected));
+        }
+        if kept.iter().any(|other| aprons::coincides(other, &curve)) {
+            notes.push(format!("{place}: an outline on layer {layer} that is there already is left out"));
+        } else {
+            kept.push(curve);
+        }
+    }
+    Ok(kept)
+}
+
+/// Where two lines of an outline cross, if any do (m).
+fn crosses_itself(curve: &Curve) -> Option<DVec2> {
+    // An arc's circle lies around it.
+    let around = |piece: &Piece| match *piece {
+        Piece::Segment { from, to } => (from.min(to), from.max(to)),
+        Piece::Arc { centre, radius, .. } => (centre - radius, centre + radius),
+    };
+    let boxes: Vec<(DVec2, DVec2)> = curve.pieces.iter().map(around).collect();
+    let is_near = |a: usize, b: usize| boxes[a].0.cmple(boxes[b].1).all() && boxes[b].0.cmple(boxes[a].1).all();
+    let is_within = |piece: &Piece, p: DVec2| {
+        [0.0, piece.length()].into_iter().all(|end| FROM_ENDS < piece.point_at(end).distance(p))
+    };
+    let crossing = |(a, b): (usize, usize)| {
+        let (one, other) = (&curve.pieces[a], &curve.pieces[b]);
+        one.meetings(other).into_iter().find(|&p| is_within(one, p) && is_within(other, p))
+    };
+    let pairs = (0..boxes.len()).flat_map(|b| (0..b).map(move |a| (a, b)));
+    pairs.filter(|&(a, b)| is_near(a, b)).find_map(crossing)
 }
 
 /// Ways, of which those that are drawn in parts are one each: an end at which one other begins, and nothing else meets.

@@ -202,6 +202,37 @@ fn lines_and_arcs_whose_ends_meet_are_joined_and_those_that_do_not_are_refused_b
 }
 
 #[test]
+fn drawings_that_would_be_another_road_are_refused_by_line() {
+    let road = Road::named("16m").unwrap();
+    let whole = drawn(&road, 1.0);
+    let refusal = |text: &str, expected: &str| {
+        let said = parse(Path::new("site.dxf"), text, &layers()).unwrap_err().to_string();
+        assert!(said.contains("line ") && said.contains(expected), "{said}");
+    };
+    refusal(&format!("{HEADER}{whole}"), "is the file whole?");
+    let way = polyline("Lane", &road.ground().lines[0].line, false, 1.0);
+    let reversed = polyline("Lane", &road.ground().lines[0].line.reversed(), false, 1.0);
+    refusal(&format!("{HEADER}{}{END}", whole.replacen(&way, &reversed, 1)), "reverse it");
+    // A bow tie beside the road.
+    let vertices = [(60.0, 60.0), (70.0, 70.0), (70.0, 60.0), (60.0, 70.0)];
+    let vertices = vertices.map(|(x, y)| format!("10\n{}\n20\n{}\n", AT.x + x, AT.y + y)).concat();
+    let bow_tie = format!("0\nLWPOLYLINE\n8\nKERB\n90\n4\n70\n1\n{vertices}");
+    refusal(&format!("{HEADER}{whole}{bow_tie}{END}"), "crosses itself at (3065.000, -435.000) m");
+    let tilted = format!("0\nCIRCLE\n8\nKERB\n10\n{}\n20\n{}\n40\n3\n230\n0.866\n", AT.x, AT.y);
+    refusal(&format!("{HEADER}{whole}{tilted}{END}"), "tilted plane");
+}
+
+#[test]
+fn an_outline_that_is_drawn_twice_is_left_out_and_said() {
+    let road = Road::named("16m").unwrap();
+    let whole = drawn(&road, 1.0);
+    let again: String = road.ground().faces.loops.iter().map(|curve| polyline("KERB", curve, true, 1.0)).collect();
+    let Drawn { ground, notes } = read(&(whole.clone() + &again), &layers()).unwrap();
+    assert_eq!(ground.faces, read(&whole, &layers()).unwrap().ground.faces);
+    assert!(notes.len() == road.ground().faces.loops.len() && notes[0].contains("is there already"), "{notes:?}");
+}
+
+#[test]
 fn what_is_neither_a_line_nor_an_arc_is_refused_by_its_line_and_other_layers_are_left_out() {
     let road = drawn(&Road::named("16m").unwrap(), 1.0);
     for (entity, expected) in [
