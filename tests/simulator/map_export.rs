@@ -31,6 +31,7 @@ fn read_back(road: &Road) -> (Map, Ground) {
     let text = exported(road).unwrap();
     let map = Map::parse(Path::new("back.xodr"), &text, Hand::Map).unwrap();
     assert_eq!(map.warnings().collect::<Vec<_>>(), Vec::<&str>::new(), "{}", road.name);
+    assert_eq!(map.rings().len(), 1, "{}: {:?}", road.name, map.rings());
     let ring = map.nearest(road.ground().origin).unwrap();
     let found = map.ground(&ring, &Options::default()).unwrap().ground;
     // The arms' names are those of the arms in the same direction.
@@ -66,7 +67,7 @@ fn key(ground: &Ground, line: &Line) -> (String, &'static str, u32, String) {
 
 #[test]
 fn a_road_that_is_written_as_a_map_is_read_back_with_its_routes_and_kerbs_within_a_centimetre() {
-    let names = ["16m", "40m", "50m-maps", "wide/7/3", "wide/7/10", "wide/7/26"];
+    let names = ["16m", "40m", "32m-maps", "50m-maps", "wide/7/3", "wide/7/10", "wide/7/26"];
     for (name, mirrored) in names.into_iter().map(|name| (name, false)).chain([("16m", true)]) {
         let road = placed(name, mirrored);
         let own = road.ground();

@@ -1,6 +1,7 @@
 //! Maps that contradict themselves or say more than is read: what is said of it, and what is left alone.
 
 use glam::DVec2;
+use offtrack::geometry::Curve;
 use offtrack::map::opendrive::Options;
 
 use crate::map_kinds::{imported, parsed, plain};
@@ -27,6 +28,16 @@ fn a_traffic_island_far_from_the_ring_changes_nothing_of_it() {
     for (one, other) in one.iter().zip(other) {
         assert!((one.length() - other.length()).abs() < 1e-6, "{} {}", one.length(), other.length());
     }
+}
+
+#[test]
+fn a_round_island_is_a_circle_within_millimetres() {
+    let radius = imported(&parsed(&plain())).ground.island_radius + 0.5;
+    let object = format!("<object id=\"1\" type=\"trafficIsland\" s=\"50\" t=\"200\" radius=\"{radius}\"/>");
+    let ground = imported(&parsed(&beside(-50.0, &object))).ground;
+    let off = |curve: &Curve| curve.polyline(1e-4).iter().map(|p| (p.length() - radius).abs()).fold(0.0, f64::max);
+    assert!((ground.island_radius - radius).abs() < 5e-3, "{}", ground.island_radius);
+    assert!(ground.faces.loops.iter().any(|curve| off(curve) < 5e-3), "{radius}");
 }
 
 #[test]

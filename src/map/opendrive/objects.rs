@@ -1,5 +1,7 @@
 //! Traffic islands that a map gives as objects: solid outlines beside the lanes.
 
+use std::f64::consts::{PI, TAU};
+
 use glam::DVec2;
 use roxmltree::Node;
 
@@ -37,8 +39,11 @@ pub(super) fn islands(source: &mut Source, node: Node, road: &RoadRecord) -> Res
         }
         contours.retain(|corners| !corners.is_empty());
         if contours.is_empty() && 0.0 < radius {
-            let corner = |corner| place + radius * DVec2::from_angle(f64::from(corner) * std::f64::consts::TAU / 32.0);
-            contours.push((0..32).map(corner).collect());
+            // As many as keep the edges within a millimetre of the circle, where so many may be.
+            let half = (1.0 - 1e-3 / radius.max(1e-2)).acos();
+            let n = ((PI / half).ceil() as usize).clamp(32, MOST_CORNERS);
+            let corner = |corner| place + radius * DVec2::from_angle(corner as f64 * TAU / n as f64);
+            contours.push((0..n).map(corner).collect());
         } else if contours.is_empty() && 0.0 < length && 0.0 < width {
             let half = DVec2::new(length, width) / 2.0;
             let unit = [DVec2::new(-1.0, -1.0), DVec2::new(1.0, -1.0), DVec2::ONE, DVec2::new(-1.0, 1.0)];

@@ -104,6 +104,13 @@ pub(super) fn rings(strips: &[Strip], graph: &Graph) -> (Vec<Ring>, Vec<Refused>
         refused.push(Refused { centre, radius, reason });
     }
     rings.sort_by(|one, other| other.radius.total_cmp(&one.radius));
+    // A void between a ring's lanes and the edge of its island is a hole around the island's.
+    let is_around = |one: &Ring, other: &Ring| {
+        let apart = one.centre.distance(other.centre);
+        other.radius < one.radius && apart < 0.1 * one.radius && 0.8 * one.radius < other.radius
+    };
+    let is_void = |one: &Ring| rings.iter().any(|other| is_around(one, other));
+    let rings: Vec<Ring> = rings.iter().filter(|one| !is_void(one)).cloned().collect();
     refused.sort_by(|one, other| other.radius.total_cmp(&one.radius));
     (rings, refused)
 }
