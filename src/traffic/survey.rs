@@ -46,6 +46,8 @@ pub struct Counts {
     pub served: u64,
     /// Those of them that stood in a blocked ring for two minutes, and were taken away.
     pub removed: u64,
+    /// Steps in which cars waited outside since as many as can be were on the road.
+    pub crowded: u64,
     /// Ring cars that passed the arm's entry.
     pub circulating: u64,
     /// Sum of the control delays of cars that came up to speed behind the line (s).
@@ -67,6 +69,7 @@ impl Counts {
         self.stayed += other.stayed;
         self.served += other.served;
         self.removed += other.removed;
+        self.crowded += other.crowded;
         self.circulating += other.circulating;
         self.delay += other.delay;
         self.delayed += other.delayed;
@@ -267,6 +270,10 @@ impl<'a> Observer<'a> {
         }
         if !counts {
             return;
+        }
+        if run.cars.iter().all(Car::is_there) {
+            let waits = |source: &usize| 0 < run.waiting(*source);
+            (0..self.counts.len()).filter(waits).for_each(|source| self.counts[source].crowded += 1);
         }
         let mut queued: Vec<usize> = (0..self.counts.len()).map(|source| run.waiting(source)).collect();
         for (slot, car) in run.cars.iter().enumerate().filter(|(slot, car)| car.is_there() && !changed[*slot]) {

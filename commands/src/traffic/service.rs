@@ -32,6 +32,8 @@ struct Found {
     stayed: f64,
     /// How many stood in a blocked ring for two minutes, and were taken away.
     removed: u64,
+    /// Part of the time in which cars waited outside since as many as can be were on the road.
+    crowded: f64,
 }
 
 /// What was found of an entry lane; flows in cars an hour, delays in seconds, queues in cars.
@@ -105,6 +107,8 @@ fn found(args: &Args, place: &Place, mix: Mix, bar: &Bar) -> Result<Found, Error
         let level = counts.least_mean_delay().map(|delay| level_of_lane(delay, counts.is_over_capacity()));
         Entry { arm, lane, demand, served, circulating, delay, level, queue_95, hcm }
     };
+    let most_crowded = sums.iter().map(|counts| counts.crowded).max().unwrap_or(0);
+    let steps = f64::from(args.runs) * f64::from(args.minutes * STEPS_A_MINUTE);
     let mut all = Counts::default();
     sums.iter().for_each(|counts| all.add(counts));
     Ok(Found {
@@ -118,6 +122,7 @@ fn found(args: &Args, place: &Place, mix: Mix, bar: &Bar) -> Result<Found, Error
         served: all.served as f64 / hours,
         stayed: all.stayed as f64 / all.came.max(1) as f64,
         removed: all.removed,
+        crowded: most_crowded as f64 / steps,
     })
 }
 
@@ -179,7 +184,18 @@ impl Found {
             1 => "1 vehicle stood in a blocked ring for two minutes and was taken away.\n".to_owned(),
             n => format!("{n} vehicles stood in a blocked ring for two minutes and were taken away.\n"),
         };
+        let crowded = if 0.0 < self.crowded {
+            let part = rounded(100.0 * self.crowded, 1);
+            format!("{part} % of the time as many were on the road as can be, and others waited for that alone.\n")
+        } else {
+            String::new()
+        };
         let length = if self.runs == 1 { "1 run".to_owned() } else { format!("{} runs", self.runs) };
-        format!("{}: cars an hour over {length} of {} min\n{}{away}{removed}", self.road, self.minutes, table(&rows))
+        format!(
+            "{}: cars an hour over {length} of {} min\n{}{away}{removed}{crowded}",
+            self.road,
+            self.minutes,
+            table(&rows)
+        )
     }
 }

@@ -182,6 +182,26 @@ fn a_junction_without_a_ring_takes_900_cars_an_hour_and_no_more_and_no_flow_is_n
 }
 
 #[test]
+fn where_slots_are_short_no_lane_is_starved() {
+    let network = Network::bake(&Road::named("20m").unwrap()).unwrap();
+    let demand = Demand::new(&network, &vec![1.0; network.paths.len()], Mix::default()).unwrap();
+    let mut run = Run::new(&network, &Rules::FITTED, &demand, 64, Stream::default());
+    let n = network.sources.len();
+    let mut entered = vec![0; n];
+    for _ in 0..6000 {
+        (0..n).for_each(|source| run.fill(source));
+        run.step(|event, _| {
+            if let Event::Entered(source, _) = event {
+                entered[source] += 1;
+            }
+        });
+    }
+    let right: Vec<u32> = (0..n).filter(|&at| network.sources[at].lane == 0).map(|at| entered[at]).collect();
+    let (least, most) = (right.iter().min().unwrap(), right.iter().max().unwrap());
+    assert!(2 <= right.len() && *most < least + least / 5, "{entered:?}");
+}
+
+#[test]
 fn as_many_cars_come_and_take_each_exit_as_are_asked_for() {
     let network = baked("16m");
     let asked = Demand::even(&network, 1200.0);
