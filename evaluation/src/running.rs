@@ -140,6 +140,9 @@ fn front_axle(rig: &Rig, truck: &Truck) -> Vec2 {
     truck.position + rig.wheelbase * Vec2::from_angle(truck.heading)
 }
 
+/// Least way ahead of the front axle that is kept as a part of its path (m).
+const LEAST_WAY: f32 = 0.01;
+
 /// Largest distance of the trailer's axle from the path of the front axle (m). The trailer follows the path in order,
 /// so the search for the nearest segment only moves forwards, and what lies behind it is dropped.
 struct OffTracking {
@@ -157,7 +160,11 @@ impl OffTracking {
 
     /// Adds the positions of both axles after another step (m).
     fn push(&mut self, front: Vec2, trailer: Vec2) {
-        self.front.push_back(front);
+        // At points of a truck that stands or rolls back, both of whose segments are equally far, the search would stay.
+        let [.., before, last] = self.front.make_contiguous() else { return };
+        if LEAST_WAY <= (front - *last).dot((*last - *before).normalize_or_zero()) {
+            self.front.push_back(front);
+        }
         self.waiting.push_back(trailer);
         while let Some(&point) = self.waiting.front() {
             self.advance(point);
@@ -219,6 +226,23 @@ mod tests {
         // The chords of the path lie up to 1 mm inside its circle.
         assert!((most - 2.0).abs() < 2e-3, "{most}");
         assert!((30..40).contains(&held), "{held} points of 2000 steps are held");
+    }
+
+    #[test]
+    fn a_truck_that_creeps_or_rolls_back_leaves_the_figure_as_it_is() {
+        let at = |radius: f32, step: f32| radius * Vec2::from_angle(0.02 * step);
+        // At step 100 it stands, creeps ahead by micrometres or rolls back by a millimetre.
+        for way in [0.0, 1e-6, -1e-3] {
+            let steps = |lag: f32| {
+                let moved = (0..400).map(move |step| step as f32 - lag);
+                let (before, after) = (moved.clone().take(100), moved.skip(100));
+                before.chain((0..20).map(move |n| 99.0 - lag + n as f32 * way / 0.4)).chain(after)
+            };
+            let front: Vec<Vec2> = steps(0.0).map(|step| at(20.0, step)).collect();
+            let trailer: Vec<Vec2> = steps(30.0).map(|step| at(18.0, step.max(1.0))).skip(2).collect();
+            let (most, _) = off_tracking(&front, &trailer);
+            assert!((most - 2.0).abs() < 2e-3, "{way}: {most}");
+        }
     }
 
     #[test]
