@@ -83,13 +83,23 @@ impl Policy {
         if self.actions.len() == world.actions.len() && self.actions.iter().zip(&world.actions).all(same) {
             return Ok(());
         }
+        let (mut here, mut there) = (described(&self.actions), described(&world.actions));
+        if here == there
+            && let Some(index) = self.actions.iter().zip(&world.actions).position(|pair| !same(pair))
+        {
+            let action = |actions: &[Action]| format!("action {index} is {}", of_action(&actions[index]));
+            (here, there) = (action(&self.actions), action(&world.actions));
+        }
         Err(format!(
-            "learned with another action table: {} here, {} in the benchmark; a policy that learned with the same \
-             actions and the same vehicle lock is needed",
-            described(&self.actions),
-            described(&world.actions),
+            "learned with another action table: {here} here, {there} in the benchmark; a policy that learned with the \
+             same actions and the same vehicle lock is needed",
         ))
     }
+}
+
+/// An action in words.
+fn of_action(action: &Action) -> String {
+    format!("{:.1} deg, {:.1} km/h", action.steering.to_degrees(), 3.6 * action.speed)
 }
 
 /// An action table in a few words.
