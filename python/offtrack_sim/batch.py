@@ -307,9 +307,10 @@ class Batch(_offtrack.Batch):
     def kerb_distance(self, route: str, points: npt.ArrayLike) -> Floats:
         """Distance of points ``[n, 2]`` from the nearest kerb of a route's road [m], negative off the road, ``[n]``.
 
-        Up to 5 m from a kerb it is within 1 cm, or 3 cm where two kerbs are equally near; beyond 7.5 m inside a solid
-        and 15.9 m from all kerbs it stays. Off the road's field everything is solid, and the value falls with the
-        distance from the field. The frame is that of :meth:`road`.
+        Inside the road's field, up to 5 m from a kerb, it is within 1 cm, or 3 cm where two kerbs are equally near;
+        beyond 7.5 m inside a solid and 15.9 m from all kerbs it stays. Off the field, which ends some metres beyond the
+        outermost kerbs, everything is solid, and the value falls with the distance from the field. The frame is that of
+        :meth:`road`.
         """
         found = numbers("points", points, "numbers of shape (n, 2) are needed").astype(np.float64)
         if found.ndim != 2 or found.shape[1] != 2 or not np.isfinite(found).all():
