@@ -47,7 +47,8 @@ class Observer(_offtrack.Observer):
     """Trucks that another simulator or a real one drives: what a policy observes of them.
 
     Poses are in the frame of the map that a road is from (an outline file's ``origin``): x east, y north, metres,
-    radians, counter-clockwise, signs as on the map on left-hand roads too. There are no dynamics.
+    radians, counter-clockwise, signs as on the map on left-hand roads too. There are no dynamics, and none of a
+    benchmark's ``[disturbances]``: poses from elsewhere have errors of their own.
 
     Args:
         scenario: Benchmark, as for :class:`offtrack_sim.Batch`.
