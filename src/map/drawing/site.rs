@@ -181,8 +181,14 @@ fn crosses_itself(curve: &Curve) -> Option<DVec2> {
         let (one, other) = (&curve.pieces[a], &curve.pieces[b]);
         one.meetings(other).into_iter().find(|&p| is_within(one, p) && is_within(other, p))
     };
-    let pairs = (0..boxes.len()).flat_map(|b| (0..b).map(move |a| (a, b)));
-    pairs.filter(|&(a, b)| is_near(a, b)).find_map(crossing)
+    // From west to east: those that reach as far as the next one begins.
+    let mut order: Vec<usize> = (0..boxes.len()).collect();
+    order.sort_by(|&a, &b| boxes[a].0.x.total_cmp(&boxes[b].0.x));
+    let of_one = |(place, &a): (usize, &usize)| {
+        let beside = order[place + 1..].iter().take_while(|&&b| boxes[b].0.x <= boxes[a].1.x);
+        beside.filter(|&&b| is_near(a, b)).find_map(|&b| crossing((a, b)))
+    };
+    order.iter().enumerate().find_map(of_one)
 }
 
 /// Ways, of which those that are drawn in parts are one each: an end at which one other begins, and nothing else meets.
