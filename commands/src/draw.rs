@@ -123,7 +123,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
         Error::Setting { name: flag, value: format!("{value} m"), expected: leaves.to_string() }
     })?;
     let route = args.route.as_deref().map(|name| chosen(&routes, name)).transpose()?;
-    let sweep = route.map(|route| sweep(args, &driven, route)).transpose()?;
+    let sweep = route.map(|route| sweep(args, &driven, &roundabout, route)).transpose()?;
     let bytes = if format == Format::Json {
         let shown = route.map_or(routes.as_slice(), std::slice::from_ref);
         let text = json::written(&driven, args.gutter, shown, sweep.as_ref());
@@ -157,14 +157,13 @@ pub fn run(args: &Args) -> Result<(), Error> {
     }
 }
 
-/// The path of the vehicle on a route as it lies in the world; `road` is as it is driven.
-fn sweep<'a>(args: &Args, road: &Road, route: &'a Route) -> Result<Sweep<'a>, Error> {
+/// The path of the vehicle on a route of a road as it lies in the world, `seen`; `road` is as it is driven.
+fn sweep<'a>(args: &Args, road: &Road, seen: &Road, route: &'a Route) -> Result<Sweep<'a>, Error> {
     let vehicle = Vehicle::find(&args.vehicle)?;
     check_load(&vehicle, &args.load)?;
     let name = Source::find(Kind::Vehicle, &args.vehicle)?.stem();
     let driven = Driven { vehicle: name, load: args.load.clone(), speed_kmh: args.speed_kmh };
-    let kerbs = road.seen().unit_kerbs_beyond_ends(args.gutter);
-    Ok(Sweep::new(&vehicle.seen_on(road), driven, &kerbs, route))
+    Ok(Sweep::new(&vehicle.seen_on(road), driven, &seen.unit_kerbs_beyond_ends(args.gutter), route))
 }
 
 fn format(output: &Path) -> Result<Format, Error> {

@@ -160,9 +160,9 @@ impl OffTracking {
 
     /// Adds the positions of both axles after another step (m).
     fn push(&mut self, front: Vec2, trailer: Vec2) {
-        // At points of a truck that stands or rolls back, both of whose segments are equally far, the search would stay.
-        let [.., before, last] = self.front.make_contiguous() else { return };
-        if LEAST_WAY <= (front - *last).dot((*last - *before).normalize_or_zero()) {
+        // The search would stay at a point where the truck stands or rolls back: both of its segments are equally far.
+        let [before, last] = [2, 1].map(|back| self.front[self.front.len() - back]);
+        if LEAST_WAY <= (front - last).dot((last - before).normalize_or_zero()) {
             self.front.push_back(front);
         }
         self.waiting.push_back(trailer);

@@ -98,8 +98,8 @@ pub struct Infos<'a> {
 }
 
 impl Infos<'_> {
-    /// The infos of the episodes that a step ended, whose last observations have `n_values` values. `episodes` has those
-    /// that trucks are in after the step; of `waiting` ones, which wait for their group, those that have ended.
+    /// The infos of the episodes that a step ended, whose last observations have `n_values` values. `episodes` has
+    /// those that trucks are in after the step; of `waiting` ones, which wait for their group, those that have ended.
     pub fn of_ends<'py>(
         &self,
         py: Python<'py>,

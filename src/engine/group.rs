@@ -169,7 +169,8 @@ pub(super) fn route_of(world: &World, routes: &[u32], row: &Row, episode: u32) -
     route
 }
 
-/// Whether some trucks of the row's group, one of which begins on this route, begin on one arm: they are more than arms.
+/// Whether some trucks of the row's group, one of which begins on this route, begin on one arm: there are more of them
+/// than arms.
 pub(super) fn shares_arms(world: &World, row: &Row, route: u32) -> bool {
     if row.mates.is_empty() {
         return false;

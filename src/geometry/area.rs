@@ -2,6 +2,8 @@
 //!
 //! An outer contour is counter-clockwise, a hole clockwise: the area lies on the left of each.
 
+use std::f64::consts::PI;
+
 use glam::DVec2;
 use i_overlay::core::fill_rule::FillRule;
 use i_overlay::core::overlay_rule::OverlayRule;
@@ -29,6 +31,11 @@ pub(crate) struct Area {
 /// The points of a contour.
 pub(crate) fn points(contour: &[[f64; 2]]) -> Vec<DVec2> {
     contour.iter().map(|&p| DVec2::from(p)).collect()
+}
+
+/// Number of corners with which a regular polygon in a circle of this radius lies within `off` of it (both m).
+pub(crate) fn corners_of_circle(radius: f64, off: f64) -> usize {
+    (PI / (1.0 - off / radius).acos()).ceil() as usize
 }
 
 /// A closed contour with points at most `step` apart (m).

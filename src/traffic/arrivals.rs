@@ -94,9 +94,10 @@ pub fn arrive(
     }
     // Where slots are short the last sources would never have one. Benchmarks, whose slots are fewer, keep their order.
     let n = network.sources.len();
-    let n_free = cars.iter().filter(|car| !car.is_there()).count();
-    let is_short = n_free < (0..n).filter(|&source| 0 < waiting(backlog, source)).count();
-    let first = if cars.len() == MOST_CARS && is_short { clock.step as usize % n } else { 0 };
+    let n_free = || cars.iter().filter(|car| !car.is_there()).count();
+    let n_waiting = || (0..n).filter(|&source| 0 < waiting(backlog, source)).count();
+    let takes_turns = cars.len() == MOST_CARS && n_free() < n_waiting();
+    let first = if takes_turns { clock.step as usize % n } else { 0 };
     for source in (first..n).chain(0..first) {
         if waiting(backlog, source) == 0 {
             continue;

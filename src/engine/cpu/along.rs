@@ -107,8 +107,7 @@ fn pulled(heading: Vec2, unit_length: f32, way: Vec2) -> Vec2 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::cpu::drive::driven;
-    use crate::engine::cpu::drive::settled;
+    use crate::engine::cpu::drive::{driven, settled};
     use crate::engine::cpu::follow::reference_point;
     use crate::layout::Control;
     use crate::layout::angle::{direction, wrapped};

@@ -80,12 +80,13 @@ pub(in crate::engine) fn put(world: &World, row: &mut Row, begin: &BeginRow) {
     let Stream { seed, env } = row.stream;
     let episode = if begin.what & IS_FIRST == 0 { row.truck.episode + 1 } else { 0 };
     let route = if begin.what & HAS_ROUTE == 0 { route_of(world, row, episode) } else { begin.route };
-    let mut start =
-        if begin.what & HAS_START == 0 { drawn_start(&world.params, seed, env, episode) } else { begin.start };
-    if begin.what & HAS_START == 0 && group::shares_arms(world, row, route) {
+    let start = if begin.what & HAS_START == 0 {
+        let drawn = drawn_start(&world.params, seed, env, episode);
         // Off their lanes' centres, trucks beside each other may stand in each other.
-        (start.offset, start.heading) = (0.0, 0.0);
-    }
+        if group::shares_arms(world, row, route) { Start { offset: 0.0, heading: 0.0, ..drawn } } else { drawn }
+    } else {
+        begin.start
+    };
     let waypoints = world.route_waypoints(route);
     let rig = &world.rigs[start.vehicle as usize];
     let first = along::first_waypoint(waypoints.len() as u32, start.along) as usize;

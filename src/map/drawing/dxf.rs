@@ -257,10 +257,11 @@ fn curve(file: &Path, entity: &[Pair], vertices: &[&[Pair]], metres: f64) -> Res
     let refused = |expected: &str| Reader::of(file).invalid(format!("line {line}"), kind, expected);
     let flags = number(entity, 70)?.unwrap_or(0.0) as u32;
     // An extrusion downwards mirrors what is drawn.
-    if number(entity, 230)?.is_some_and(|z| z < 0.0) {
+    let upwards = number(entity, 230)?.unwrap_or(1.0);
+    if upwards < 0.0 {
         return Err(refused("is drawn from below (extrusion 0, 0, -1): flatten it"));
     }
-    if number(entity, 230)?.is_some_and(|z| z < 0.9999) {
+    if upwards < 0.9999 {
         return Err(refused("is drawn in a tilted plane (extrusion): flatten it"));
     }
     let (curve, is_closed) = match kind {

@@ -153,8 +153,8 @@ fn closed(reader: &Reader, drawn: Vec<Entity>, layer: &str, notes: &mut Vec<Stri
     let mut kept: Vec<Curve> = Vec::new();
     for (place, curve) in loops {
         if let Some(at) = crosses_itself(&curve) {
-            let expected = format!("the outline crosses itself at ({:.3}, {:.3}) m", at.x, at.y);
-            return Err(reader.invalid(place, "crosses itself", expected));
+            let found = format!("crosses itself at ({:.3}, {:.3}) m", at.x, at.y);
+            return Err(reader.invalid(place, found, "one side of an outline is solid: it must not cross itself"));
         }
         if kept.iter().any(|other| aprons::coincides(other, &curve)) {
             notes.push(format!("{place}: an outline on layer {layer} that is there already is left out"));

@@ -1,6 +1,6 @@
 //! Traffic islands that a map gives as objects: solid outlines beside the lanes.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 use glam::DVec2;
 use roxmltree::Node;
@@ -9,6 +9,7 @@ use super::records::{Island, RoadRecord};
 use super::source::Source;
 use super::xml::{attribute, child, children};
 use crate::files::reader::Error;
+use crate::geometry::area::corners_of_circle;
 
 /// Largest size of an object (m).
 const LARGEST: f64 = 1000.0;
@@ -40,8 +41,7 @@ pub(super) fn islands(source: &mut Source, node: Node, road: &RoadRecord) -> Res
         contours.retain(|corners| !corners.is_empty());
         if contours.is_empty() && 0.0 < radius {
             // As many as keep the edges within a millimetre of the circle, where so many may be.
-            let half = (1.0 - 1e-3 / radius.max(1e-2)).acos();
-            let n = ((PI / half).ceil() as usize).clamp(32, MOST_CORNERS);
+            let n = corners_of_circle(radius.max(1e-2), 1e-3).clamp(32, MOST_CORNERS);
             let corner = |corner| place + radius * DVec2::from_angle(corner as f64 * TAU / n as f64);
             contours.push((0..n).map(corner).collect());
         } else if contours.is_empty() && 0.0 < length && 0.0 < width {

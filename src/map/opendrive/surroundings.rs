@@ -9,7 +9,7 @@ use super::Map;
 use super::lanes::{Strip, sampled};
 use super::records::Kind;
 use super::surface::Surface;
-use crate::geometry::area::{Area, points, signed_area};
+use crate::geometry::area::{Area, corners_of_circle, points, signed_area};
 use crate::geometry::{Curve, Outline, fitted_outline};
 
 /// Chords of edges leave their curves by at most this much before arcs are fitted (m).
@@ -41,7 +41,7 @@ pub(super) fn surface(map: &Map, centre: DVec2, extent: f64) -> Surface {
 
 /// The parts of a surface within `extent` of the origin, clipped to that circle.
 pub(super) fn clipped(surface: &Area, extent: f64) -> Vec<Part> {
-    let corners = (TAU / (2.0 * (1.0 - FINE / extent).acos())).ceil() as usize;
+    let corners = corners_of_circle(extent, FINE);
     let disc = Area::union(std::iter::once(
         (0..corners).map(|i| extent * DVec2::from_angle(i as f64 * TAU / corners as f64)).collect(),
     ));

@@ -90,8 +90,8 @@ impl Records {
         let (percent, roads, all) = (100.0 * most.level.crossfall, tilted.count(), self.roads.len());
         let largest = format!("up to {percent:.1} % on road {}", shown(&most.id));
         self.warnings.push(format!(
-            "{roads} of {all} roads have a crossfall (superelevation, crossfall, shape), {largest}; the simulated road is \
-             level"
+            "{roads} of {all} roads have a crossfall (superelevation, crossfall, shape), {largest}; the simulated road \
+             is level"
         ));
     }
 
