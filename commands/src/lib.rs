@@ -18,6 +18,7 @@ pub mod program; // arguments read, a command run, its exit code
 pub mod progress; // the bar on a terminal
 pub mod record;
 pub mod roads; // benchmarks and roads by name
+pub mod signals; // Ctrl-C and others
 pub mod terminal; // how wide a table may be
 pub mod trace;
 pub mod traffic;

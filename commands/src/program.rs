@@ -9,6 +9,7 @@ use offtrack::files::reader::shortened;
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 
+use crate::signals::on_signals;
 use crate::{
     board, certify, compare, deviations, devices, draw, evaluate, export, fits, generate, import, record, trace,
     traffic, vehicles, web,
@@ -148,9 +149,9 @@ pub fn parsed<P: Parser>(arguments: &[OsString]) -> Result<P, u8> {
     })
 }
 
-/// Has Ctrl-C and SIGTERM end the process with nothing half-written left.
+/// Has Ctrl-C, SIGTERM and SIGHUP end the process with nothing half-written left.
 pub fn end_on_signals() {
-    let _ = ctrlc::set_handler(|| {
+    on_signals(|| {
         files::remove_temporaries();
         std::process::exit(INTERRUPTED.into());
     });

@@ -12,7 +12,7 @@ mod set;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use offtrack::files::reader::Reader;
+use offtrack::files::reader::{Reader, said};
 use offtrack::scenario::RewardChanges;
 use serde::{Deserialize, Serialize};
 
@@ -236,6 +236,31 @@ pub struct Entropy {
     pub learning_rate: f64,
 }
 
+/// Values that flags of the command line give in place of a training file's.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Flags {
+    /// `--seed`.
+    pub seed: Option<u32>,
+    /// `--minutes`. It or `--steps` replaces the whole budget.
+    pub minutes: Option<f64>,
+    /// `--steps`.
+    pub steps: Option<u64>,
+    /// `--envs`.
+    pub envs: Option<usize>,
+}
+
+impl Flags {
+    /// Those that can be wrong as they are given.
+    fn words(&self) -> impl Iterator<Item = String> {
+        let words = [
+            self.minutes.map(|minutes| format!("--minutes {minutes}")),
+            self.steps.map(|steps| format!("--steps {steps}")),
+            self.envs.map(|envs| format!("--envs {envs}")),
+        ];
+        words.into_iter().flatten()
+    }
+}
+
 impl Config {
     /// Reads a training file by its path or its name, `default`. Everything that can be wrong with it is found here,
     /// with its key.
@@ -245,54 +270,53 @@ impl Config {
 
     /// Reads a training file with some of its keys set to other values, each `KEY=VALUE`.
     pub fn read_with(file: &Path, settings: &[String]) -> Result<Config, Error> {
-        Config::read_for(file, None, settings)
+        Config::read_for(file, None, settings, &Flags::default())
     }
 
-    /// Reads a training file as [`Config::read_with`] does, for another benchmark alone if one is given.
-    pub fn read_for(file: &Path, benchmark: Option<&str>, settings: &[String]) -> Result<Config, Error> {
+    /// Reads a training file as [`Config::read_with`] does, for another benchmark alone if one is given, and with flags.
+    pub fn read_for(file: &Path, benchmark: Option<&str>, settings: &[String], flags: &Flags) -> Result<Config, Error> {
         let mut table = file::resolved(file)?;
         if let Some(benchmark) = benchmark {
             set::set_benchmark(&mut table, benchmark);
         }
         set::set(&mut table, settings)?;
-        let origin = Config::origin(file, benchmark, settings);
-        let wrong = |error: toml::de::Error| Error::contents(&origin, error.to_string().trim().replace('\n', ", "));
-        let config: Config = table.try_into().map_err(wrong)?;
+        let origin = Config::origin(file, benchmark, settings, flags);
+        // Shown whole, the error names the key too.
+        let wrong = |error: toml::de::Error| {
+            let fault = error.to_string().replace(error.message(), &said(&error));
+            Error::contents(&origin, fault.trim().replace('\n', ", "))
+        };
+        let mut config: Config = table.try_into().map_err(wrong)?;
+        config.replace(flags);
         config.check(&Reader::of(&origin))?;
         Ok(config)
     }
 
     /// Where the keys of [`Config::read_for`] come from, for errors: `default with --set seed=3`.
-    pub fn origin(file: &Path, benchmark: Option<&str>, settings: &[String]) -> PathBuf {
-        let flags = benchmark.map(|name| format!("--benchmark {name}")).into_iter();
-        let flags: Vec<String> = flags.chain(settings.iter().map(|setting| format!("--set {setting}"))).collect();
-        if flags.is_empty() {
+    pub fn origin(file: &Path, benchmark: Option<&str>, settings: &[String], flags: &Flags) -> PathBuf {
+        let benchmark = benchmark.map(|name| format!("--benchmark {name}")).into_iter();
+        let settings = settings.iter().map(|setting| format!("--set {setting}"));
+        let all: Vec<String> = benchmark.chain(settings).chain(flags.words()).collect();
+        if all.is_empty() {
             file.to_owned()
         } else {
-            PathBuf::from(format!("{} with {}", file.display(), flags.join(" ")))
+            PathBuf::from(format!("{} with {}", file.display(), all.join(" ")))
         }
     }
 
-    /// Values from the command line replace the file's. `--minutes` or `--steps` replaces the whole budget.
-    pub fn override_with(
-        &mut self,
-        seed: Option<u32>,
-        minutes: Option<f64>,
-        steps: Option<u64>,
-        envs: Option<usize>,
-    ) -> Result<(), Error> {
+    /// Values of flags replace those of a config that has been checked.
+    pub fn override_with(&mut self, flags: &Flags) -> Result<(), Error> {
+        self.replace(flags);
+        // So an error here comes from these flags.
+        self.check(&Reader::of(Path::new(&flags.words().collect::<Vec<_>>().join(" "))))
+    }
+
+    fn replace(&mut self, &Flags { seed, minutes, steps, envs }: &Flags) {
         self.seed = seed.unwrap_or(self.seed);
         self.n_envs = envs.unwrap_or(self.n_envs);
         if minutes.is_some() || steps.is_some() {
             (self.minutes, self.steps) = (minutes, steps);
         }
-        // The file has been checked, so an error here comes from these flags.
-        let flags = [
-            minutes.map(|minutes| format!("--minutes {minutes}")),
-            steps.map(|steps| format!("--steps {steps}")),
-            envs.map(|envs| format!("--envs {envs}")),
-        ];
-        self.check(&Reader::of(Path::new(&flags.into_iter().flatten().collect::<Vec<_>>().join(" "))))
     }
 
     /// Whether a run with this config can continue one with the other: only budget and checkpoint interval may differ.

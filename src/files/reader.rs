@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 use serde::de::DeserializeOwned;
 
 pub use exactly::Exactly;
-pub use message::{LONGEST_PATH, differing, printable, shortened, shown, shown_path};
+pub use message::{LONGEST_PATH, differing, printable, said, shortened, shown, shown_path};
 
 /// What can be wrong with a file.
 #[derive(Debug, thiserror::Error)]

@@ -12,8 +12,9 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
+use offtrack_commands::signals::on_signals;
 use offtrack_evaluation::files;
-use offtrack_learner::config::{self, Config};
+use offtrack_learner::config::{self, Config, Flags};
 use offtrack_learner::error::Error;
 use offtrack_learner::run::folder::Folder;
 use offtrack_learner::run::resume::Resumed;
@@ -60,7 +61,7 @@ fn runs(args: &Args) -> PathBuf {
 fn read(args: &Args, file: &Path, n_runs: usize, display: &Display, caller: Caller) -> Result<Training, Error> {
     let config = config(args, file)?;
     let _ = files::print(&beginning::line(&config, file, n_runs));
-    let origin = Config::origin(file, args.benchmark.as_deref(), &args.settings);
+    let origin = Config::origin(file, args.benchmark.as_deref(), &args.settings, &Flags::default());
     let mut training = Training::read(config, &origin, caller)?;
     training.tensorboard = args.tensorboard;
     display.clear();
@@ -75,12 +76,13 @@ fn read(args: &Args, file: &Path, n_runs: usize, display: &Display, caller: Call
 
 /// The training file with what the command line changes.
 fn config(args: &Args, file: &Path) -> Result<Config, Error> {
-    let mut config = Config::read_for(file, args.benchmark.as_deref(), &args.settings)?;
-    config.override_with(args.seed, args.minutes, args.steps, args.envs)?;
+    check_settings(args)?;
+    let flags = Flags { seed: args.seed, minutes: args.minutes, steps: args.steps, envs: args.envs };
+    let mut config = Config::read_for(file, args.benchmark.as_deref(), &args.settings, &flags)?;
     config.check_budget(&match (args.steps, args.envs) {
         (Some(steps), _) => PathBuf::from(format!("--steps {steps}")),
         (None, Some(envs)) => PathBuf::from(format!("{} with --envs {envs}", file.display())),
-        (None, None) => Config::origin(file, args.benchmark.as_deref(), &args.settings),
+        (None, None) => Config::origin(file, args.benchmark.as_deref(), &args.settings, &flags),
     })?;
     config.from = args.from.clone().or(config.from);
     if let Some(adapter) = &args.adapter {
@@ -93,12 +95,32 @@ fn config(args: &Args, file: &Path) -> Result<Config, Error> {
     Ok(config)
 }
 
+/// An error if `--set` gives a value that a flag of its own gives, too.
+fn check_settings(args: &Args) -> Result<(), Error> {
+    let flags = [
+        ("--seed", args.seed.is_some(), "seed"),
+        ("--seeds", args.seeds.is_some(), "seed"),
+        ("--minutes", args.minutes.is_some(), "minutes"),
+        ("--steps", args.steps.is_some(), "steps"),
+        ("--envs", args.envs.is_some(), "n_envs"),
+        ("--from", args.from.is_some(), "from"),
+        ("--adapter", args.adapter.is_some(), "adapter"),
+    ];
+    for setting in &args.settings {
+        let key = setting.split_once('=').map(|(key, _)| key.trim());
+        if let Some((flag, ..)) = flags.iter().find(|(_, is_given, own)| *is_given && Some(*own) == key) {
+            return Err(Error::setting("--set", setting, format!("{flag} is given, too: leave one of them out")));
+        }
+    }
+    Ok(())
+}
+
 /// Lets Ctrl-C, SIGTERM and SIGHUP stop the run: the first lets the step in hand finish and everything be written, the
 /// second ends the process.
 fn stop_on_signals(display: &Display) {
     let stop = display.stop().clone();
-    // Without a handler a signal ends the process at once; the last policy and checkpoint are whole all the same.
-    let _ = ctrlc::set_handler(move || {
+    // Without it a signal ends the process at once; the last policy and checkpoint are whole all the same.
+    on_signals(move || {
         if stop.swap(true, Ordering::Relaxed) {
             files::remove_temporaries();
             std::process::exit(130);

@@ -7,20 +7,24 @@ use std::time::Duration;
 use crate::place::{Place, succeed};
 use crate::resume::{resume, wait_until};
 
-/// A run far too long to end by itself, once it writes figures.
-fn begun(place: &Place) -> Child {
-    let run = place
-        .training(&["--name", "run", "--steps", "1000000000"])
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
+/// The command of a run far too long to end by itself.
+fn endless(place: &Place) -> Command {
+    place.training(&["--name", "run", "--steps", "1000000000"])
+}
+
+/// A run, once it writes figures.
+fn begun(place: &Place, mut run: Command) -> Child {
+    let run = run.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     wait_until("figures", || place.file("runs/run/metrics.csv").is_file());
     run
 }
 
-fn ended(run: Child, signal: &str) -> Output {
+fn send(run: &Child, signal: &str) {
     assert!(Command::new("kill").args([signal, &run.id().to_string()]).status().unwrap().success());
+}
+
+fn ended(run: Child, signal: &str) -> Output {
+    send(&run, signal);
     run.wait_with_output().unwrap()
 }
 
@@ -37,11 +41,11 @@ fn a_stopped_run_leaves_a_policy_and_says_that_it_was_interrupted() {
     let place = Place::new();
     let patient = std::fs::read_to_string(place.file("tiny.toml")).unwrap();
     // Stopped while it learns or soon before, and while its actions are certainly still random.
-    let endless = patient.replace("capacity = 2000, warmup = 400", "capacity = 5000000, warmup = 5000000");
-    assert_ne!(endless, patient);
-    for (training, signal) in [(&patient, "-INT"), (&patient, "-TERM"), (&patient, "-HUP"), (&endless, "-INT")] {
+    let random = patient.replace("capacity = 2000, warmup = 400", "capacity = 5000000, warmup = 5000000");
+    assert_ne!(random, patient);
+    for (training, signal) in [(&patient, "-INT"), (&patient, "-TERM"), (&patient, "-HUP"), (&random, "-INT")] {
         std::fs::write(place.file("tiny.toml"), training).unwrap();
-        let run = begun(&place);
+        let run = begun(&place, endless(&place));
         std::thread::sleep(Duration::from_millis(500));
         let output = ended(run, signal);
         succeed(&output);
@@ -55,11 +59,29 @@ fn a_stopped_run_leaves_a_policy_and_says_that_it_was_interrupted() {
     }
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn a_run_goes_on_when_its_terminal_closes_where_nohup_began_it() {
+    let place = Place::new();
+    let training = endless(&place);
+    let mut ignoring = Command::new("sh");
+    ignoring.args(["-c", r#"trap "" HUP; exec "$@""#, "sh"]).arg(training.get_program()).args(training.get_args());
+    ignoring.envs(training.get_envs().filter_map(|(name, value)| Some((name, value?))));
+    let run = begun(&place, ignoring);
+    send(&run, "-HUP");
+    // A run that stops writes one row more at most.
+    let n_rows = || std::fs::read_to_string(place.file("runs/run/metrics.csv")).unwrap().lines().count();
+    let before = n_rows();
+    wait_until("figures", || before + 3 < n_rows());
+    succeed(&ended(run, "-TERM"));
+    assert_eq!(place.json("runs/run/report.json")["interrupted"], true);
+}
+
 #[test]
 fn a_run_killed_in_its_first_seconds_leaves_a_policy_and_a_checkpoint_to_continue_from() {
     let place = Place::new();
     // With the default interval of two minutes: the first checkpoint is written at once.
-    let run = begun(&place);
+    let run = begun(&place, endless(&place));
     let checkpoint = place.file("runs/run/checkpoint.safetensors");
     let policy = place.file("runs/run/policy.safetensors");
     wait_until("policy and checkpoint", || checkpoint.is_file() && policy.is_file());
@@ -73,7 +95,7 @@ fn a_run_killed_in_its_first_seconds_leaves_a_policy_and_a_checkpoint_to_continu
 #[test]
 fn a_run_that_begins_again_for_want_of_a_checkpoint_has_no_rows_of_before() {
     let place = Place::new();
-    let run = begun(&place);
+    let run = begun(&place, endless(&place));
     wait_until("a checkpoint", || place.file("runs/run/checkpoint.safetensors").is_file());
     ended(run, "-KILL");
     std::fs::remove_file(place.file("runs/run/checkpoint.safetensors")).unwrap();

@@ -67,6 +67,8 @@ fn a_run_that_cannot_be_is_refused_before_a_folder_is_made() {
         (&["--envs", "0"][..], "n_envs: 0; must lie in 1..1048576"),
         (&["--minutes", "-1"][..], "minutes"),
         (&["--steps", "0"][..], "steps: 0; must lie in"),
+        (&["--steps", "5000", "--set", "steps=6000"][..], "--set: steps=6000; --steps is given, too: leave one of"),
+        (&["--seeds", "1,2", "--set", "seed=7"][..], "--set: seed=7; --seeds is given, too: leave one of them out"),
     ] {
         let message = refusal(&place.train(arguments), 2);
         assert!(message.contains(expected), "{message}");

@@ -53,6 +53,9 @@ fn check_known(path: &[&str]) -> Result<(), String> {
         Err(error) if error.message().starts_with("unknown field") => {
             Err(format!("{}; no training file has it", error.message()))
         }
+        Err(error) if error.message().starts_with("invalid type: map") => {
+            Err("has no keys below it; no training file has it".to_owned())
+        }
         _ => Ok(()),
     }
 }
@@ -70,5 +73,7 @@ pub(super) fn remove(table: &mut Table, key: &str) -> bool {
 /// A TOML value; what is none is a word.
 fn parsed(value: &str) -> Value {
     let read = toml::from_str::<Table>(&format!("value = {value}")).ok();
-    read.and_then(|mut table| table.remove("value")).unwrap_or_else(|| Value::String(value.to_owned()))
+    // Lines after the first could set other keys.
+    let alone = read.filter(|table| table.len() == 1).and_then(|mut table| table.remove("value"));
+    alone.unwrap_or_else(|| Value::String(value.to_owned()))
 }

@@ -61,6 +61,8 @@ fn a_key_set_wrongly_is_refused_with_what_would_do() {
         ("learning.n_steps=0", "--set learning.n_steps=0: learning.n_steps: 0; must lie in 1..100"),
         ("learning.n_step=1", "unknown field `n_step`"),
         ("learning.hidden=wide", "--set learning.hidden=wide: invalid type: string"),
+        ("device=3", "--set device=3: invalid type, expected a string, in `device`"),
+        ("learning.n_steps=5\nlearning.gamma=0.5", "invalid type: string"),
         ("reward.clearance_limit=0", "reward.clearance_limit: 0 m; must lie in 0.01..10 m"),
         ("reward.lane_distance_limit=51", "reward.lane_distance_limit: 51 m; must lie in 0.1..50 m"),
         ("reward.waypoint=nan", "reward.waypoint: NaN; must lie in"),
@@ -77,6 +79,7 @@ fn a_key_that_no_training_file_has_cannot_be_taken_out() {
     for (setting, expected) in [
         ("lerning.gamma=", "--set: lerning.gamma=; unknown field `lerning`"),
         ("learning.gama=", "--set: learning.gama=; unknown field `gama`"),
+        ("learning.gamma.foo=", "--set: learning.gamma.foo=; has no keys below it; no training file has it"),
     ] {
         let message = with_set(&[setting]).unwrap_err();
         assert!(message.starts_with(expected) && message.contains("learning"), "{message}");

@@ -139,10 +139,20 @@ fn a_replay_buffer_too_small_for_its_trucks_is_refused() {
 #[test]
 fn the_command_line_replaces_keys_and_a_budget_there_replaces_both() {
     let mut config = with("steps", "minutes = 5.0\nsteps = 70000").unwrap();
-    config.override_with(Some(3), None, Some(1000), Some(16)).unwrap();
+    config.override_with(&Flags { seed: Some(3), steps: Some(1000), envs: Some(16), ..Flags::default() }).unwrap();
     assert_eq!((config.seed, config.n_envs, config.minutes, config.steps), (3, 16, None, Some(1000)));
-    let message = config.override_with(None, None, None, Some(0)).unwrap_err().to_string();
+    let none = Flags { envs: Some(0), ..Flags::default() };
+    let message = config.override_with(&none).unwrap_err().to_string();
     assert_eq!(message, "--envs 0: n_envs: 0; must lie in 1..1048576");
+    // What they replace need not go together with the rest of the file.
+    let settings = ["replay_buffer.capacity=5000", "replay_buffer.warmup=4000"].map(str::to_owned);
+    let read = |envs: Option<usize>| {
+        Config::read_for(Path::new("default"), None, &settings, &Flags { envs, ..Flags::default() })
+    };
+    assert_eq!(read(Some(64)).unwrap().n_envs, 64);
+    let message = read(Some(512)).unwrap_err().to_string();
+    assert!(message.starts_with("default with --set replay_buffer.capacity=5000 --set "), "{message}");
+    assert!(message.contains("--envs 512: replay_buffer.capacity: 5000; must hold more than"), "{message}");
 }
 
 #[test]
@@ -228,7 +238,9 @@ pub(super) fn with_set(settings: &[&str]) -> Result<Config, String> {
 
 #[test]
 fn a_benchmark_of_ones_own_takes_the_place_of_all_that_a_training_file_says_of_others() {
-    let config = Config::read_for(Path::new("default"), Some("mine.toml"), &["reward.failure=-9".to_owned()]).unwrap();
+    let config =
+        Config::read_for(Path::new("default"), Some("mine.toml"), &["reward.failure=-9".to_owned()], &Flags::default())
+            .unwrap();
     let usual = with_set(&[]).unwrap();
     assert_eq!(
         (config.benchmark.as_str(), &config.training_benchmark, &config.also_evaluate),

@@ -9,7 +9,7 @@ use super::folder::Folder;
 use super::metrics_file::MetricsFile;
 use super::progress;
 use crate::checkpoint::Stored;
-use crate::config::Config;
+use crate::config::{Config, Flags};
 use crate::error::Error;
 
 /// Most bytes of a report.
@@ -84,7 +84,7 @@ fn refused(path: &Path, expected: String) -> Error {
 
 /// Gives a run another budget; an error if nothing would be learned in it.
 fn give_budget(config: &mut Config, minutes: Option<f64>, steps: Option<u64>) -> Result<(), Error> {
-    config.override_with(None, minutes, steps, None)?;
+    config.override_with(&Flags { minutes, steps, ..Flags::default() })?;
     steps.map_or(Ok(()), |steps| config.check_budget(Path::new(&format!("--steps {steps}"))))
 }
 

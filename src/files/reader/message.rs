@@ -95,9 +95,20 @@ pub fn shortened(text: &str, limit: usize) -> String {
     format!("{head}…{tail}")
 }
 
+/// What is wrong in the words of the TOML parser, on one line.
+pub fn said(error: &toml::de::Error) -> String {
+    match error.message().trim() {
+        // Where one of some words is wanted.
+        "wanted string or table" | "invalid type: unit variant, expected string only" => {
+            "invalid type, expected a string".to_owned()
+        }
+        message => message.replace('\n', ", "),
+    }
+}
+
 /// What the TOML parser says of `text`, with the line, the table and the part of the line around the fault.
 pub(super) fn malformed(text: &str, error: &toml::de::Error) -> String {
-    let message = shortened(&error.message().trim_end().replace('\n', ", "), LONGEST_MESSAGE);
+    let message = shortened(&said(error), LONGEST_MESSAGE);
     let Some(span) = error.span() else { return message };
     let at = (0..=span.start.min(text.len())).rev().find(|&at| text.is_char_boundary(at)).unwrap_or(0);
     let table = table_at(text, at);

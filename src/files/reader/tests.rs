@@ -47,6 +47,19 @@ fn a_fault_is_reported_with_its_line_its_column_and_its_table() {
 }
 
 #[test]
+fn another_type_where_a_word_is_wanted_is_said_so() {
+    #[derive(Debug, serde::Deserialize)]
+    #[serde(rename_all = "lowercase")]
+    enum Word {
+        Yes,
+    }
+    let read = |text: &str| Reader::parse::<BTreeMap<String, Word>>(Path::new("x"), text);
+    assert!(read("a = \"yes\"").is_ok());
+    let error = read("a = 3").unwrap_err().to_string();
+    assert_eq!(error, "x: line 1, column 5: invalid type, expected a string; the line is: a = 3");
+}
+
+#[test]
 fn tables_of_an_array_are_counted() {
     #[derive(Debug, serde::Deserialize)]
     #[expect(dead_code, reason = "only parsed")]
