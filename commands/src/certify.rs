@@ -104,8 +104,11 @@ fn again(path: &Path, benchmark: Option<&str>, load: Option<&str>) -> Result<(),
 /// Searches every route from every start.
 fn certify(args: &Args) -> Result<(), Error> {
     let passes = passes(&args.widths, args.hold)?;
-    let read =
-        [("--policy", args.policy.as_ref().map(Path::new)), ("--benchmark", args.benchmark.as_ref().map(Path::new))];
+    let mut read = vec![
+        ("--policy", args.policy.as_ref().map(Path::new)),
+        ("--benchmark", args.benchmark.as_ref().map(Path::new)),
+    ];
+    read.extend(args.route.iter().map(|road| ("--route", Some(Path::new(road)))));
     outputs::distinct(&[("--json", args.json.as_deref())], &read)?;
     let benchmark = args.benchmark.as_deref().unwrap_or("attard2023");
     let scenario = roads::benchmark(benchmark)?;

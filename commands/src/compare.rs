@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use offtrack::scenario::{Scenario, Split};
 use offtrack::world::World;
-use offtrack_evaluation::comparison::{Comparison, Evaluated, Side};
+use offtrack_evaluation::comparison::{Asked, Comparison, Evaluated, Side};
 use offtrack_evaluation::device::Device;
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::page::comparison::{ComparisonPage, MOST_PAIRS, Pair};
@@ -53,8 +53,14 @@ pub fn run(args: &Args) -> Result<(), Error> {
         ("--html", args.html.as_deref()),
     ];
     let sides = Side::read_all(&args.sides)?;
-    let read: Vec<outputs::Named> =
-        sides.iter().flat_map(|side| &side.files).map(|(file, _)| ("SIDE", Some(file.as_path()))).collect();
+    // The files of each side, and those that they were made with.
+    let mut read: Vec<outputs::Named> = Vec::new();
+    for (file, evaluated) in sides.iter().flat_map(|side| &side.files) {
+        let Asked { policy, line, .. } = &evaluated.asked;
+        let files = [Some(file.as_path()), policy.as_deref().and_then(policies::file_of), line.as_deref()];
+        read.extend(files.map(|file| ("SIDE", file)));
+    }
+    read.extend(args.policy.iter().map(|policy| ("--policy", policies::file_of(policy))));
     outputs::distinct(&written, &read)?;
     if !args.policy.is_empty() && args.policy.len() != sides.len() {
         let expected = format!("{} are given; one for each of the {} sides", args.policy.len(), sides.len());

@@ -9,9 +9,18 @@ use toml::Value;
 /// A flag and the file that it names, if it is given.
 pub type Named<'a> = (&'static str, Option<&'a Path>);
 
-/// Files that commands read in the folder of a training run.
-pub fn of_run(folder: &Path) -> [PathBuf; 3] {
-    ["config.toml", "metrics.csv", "report.json"].map(|name| folder.join(name))
+/// Files of a training run in its folder, which commands read or with which it goes on.
+pub fn of_run(folder: &Path) -> [PathBuf; 7] {
+    [
+        "config.toml",
+        "metrics.csv",
+        "report.json",
+        "routes.csv",
+        "policy.safetensors",
+        "checkpoint.safetensors",
+        "policies/policies.json",
+    ]
+    .map(|name| folder.join(name))
 }
 
 /// Files that lead from one to the next by the names in them, at most: a benchmark, a roundabout, its map.

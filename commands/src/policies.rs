@@ -19,14 +19,21 @@ use crate::outputs;
 /// Names of what drives without a file.
 const WITHOUT_FILE: [&str; 4] = ["pursuit", "random", YIELDS, FOLLOWS];
 
+/// The file of a policy that is named so, if it has one and no shipped policy has that name.
+pub fn file_of(name: &str) -> Option<&Path> {
+    let name = Some(name).filter(|name| !WITHOUT_FILE.contains(name))?;
+    Some(Path::new(rule::under(name).map_or(name, |(_, policy)| policy)))
+}
+
 /// Which policy drives.
 #[derive(Debug, Clone, Default, clap::Args)]
 // A group of flags is named after its type, and a command may not have two of the same name.
 #[group(skip)]
 pub struct Choice {
     /// A policy file, `pursuit` (pure pursuit of the lane's centre), `random`, `follows` or `yields` (rules among other
-    /// vehicles), or the name of a shipped policy. Without it the policy shipped for the benchmark or, where there is
-    /// none, the first shipped one with its actions and extras.
+    /// vehicles), or the name of a shipped policy; `yields:POLICY` is a file or a shipped policy that waits by the rule.
+    /// Without it the policy shipped for the benchmark or, where there is none, the first shipped one with its actions
+    /// and extras.
     #[arg(long)]
     policy: Option<String>,
     /// With `pursuit`: look-ahead distance (m) [default: 7].
@@ -72,9 +79,7 @@ impl Choice {
 
     /// The files that these flags name, if they are files.
     pub fn files(&self) -> [outputs::Named<'_>; 2] {
-        let name = self.policy.as_deref().filter(|name| !WITHOUT_FILE.contains(name));
-        let file = name.map(|name| rule::under(name).map_or(name, |(_, policy)| policy));
-        [("--policy", file.map(Path::new)), ("--line", self.line.as_deref())]
+        [("--policy", self.policy.as_deref().and_then(file_of)), ("--line", self.line.as_deref())]
     }
 
     /// An error unless the policy is the one that the training run in `folder` has left.

@@ -70,6 +70,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let of_run = run.iter().flat_map(TrainingRun::policies).map(|(_, policy)| policy.name.clone());
     let of_run = files_of("--run", &of_run.collect::<Vec<_>>());
     let mut read = [files_of("--benchmark", &benchmarks), files_of("--policy", &args.policy), of_run].concat();
+    read.extend(files_of("--road", &args.road));
     read.push(("--baker", args.baker.clone()));
     read.extend(args.run.iter().flat_map(|folder| outputs::of_run(folder)).map(|file| ("--run", Some(file))));
     let read: Vec<outputs::Named> = read.iter().map(|(flag, file)| (*flag, file.as_deref())).collect();

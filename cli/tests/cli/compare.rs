@@ -73,6 +73,11 @@ fn a_page_shows_both_sides_of_the_episodes_that_differ() {
     assert!(said.contains("b.json: episodes end otherwise when random drives again"), "{said}");
     let said = refusal(&offtrack(&["compare", &a, &b, "--json", &a]), 2);
     assert!(said.contains("is the file of SIDE too"), "{said}");
+    let policy = place.text("policy.safetensors");
+    std::fs::write(&policy, "a policy").unwrap();
+    let said =
+        refusal(&offtrack(&["compare", &a, &b, "--html", &policy, "--policy", &policy, "--policy", "random"]), 2);
+    assert!(said.contains("is the file of --policy too") && read(policy.as_ref()) == "a policy", "{said}");
 }
 
 #[test]

@@ -71,7 +71,7 @@ fn no_output_replaces_what_the_command_reads_under_another_name() {
     std::fs::copy(&benchmark, &other).unwrap();
     let truck = place.text("truck.toml");
     std::fs::copy(repository().join("scenarios/vehicles/daf_xf.toml"), &truck).unwrap();
-    let cases: [(&[&str], &str); 9] = [
+    let cases: [(&[&str], &str); 12] = [
         (
             &["evaluate", "--benchmark", &benchmark, "--json", &truck],
             "--json: {}; is named in the file of --benchmark: ",
@@ -86,6 +86,12 @@ fn no_output_replaces_what_the_command_reads_under_another_name() {
         ),
         (&["evaluate", "--json", &to, "--html", &link], "--html: {}; is the file of --json too"),
         (&["evaluate", "--route", &own, "--json", &own], "--json: {}; is the file of --route too"),
+        (&["certify", "--route", &own, "--widths", "1", "--json", &own], "--json: {}; is the file of --route too"),
+        (
+            &["evaluate", "--run", &place.text("run"), "--html", &place.text("run/checkpoint.safetensors")],
+            "--html: {}; is the file of --run too",
+        ),
+        (&["web", "--road", &own, "--output", &own], "--output: {}; is the file of --road too"),
         (
             &["generate", "--output", &place.text("g"), "--plot", &place.text("g/contact-sheet.svg"), "--count", "2"],
             "--plot: {}; is the file of --output too",
