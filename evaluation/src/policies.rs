@@ -54,10 +54,10 @@ pub fn find(
     placed(learned, engine, world, Choice::Best)
 }
 
-/// A learned policy by the path of its file, or a shipped one by its name. A file comes first.
+/// A shipped policy by its name, or a learned one by the path of its file. A name comes first.
 pub fn learned(name: &str) -> Result<offtrack_policy::Policy, Error> {
     let file = Path::new(name);
-    let is_shipped = offtrack_policy::Policy::shipped_names().contains(&name) && !file.is_file();
+    let is_shipped = offtrack_policy::Policy::shipped_names().contains(&name);
     // A word without an extension that is no file is taken for a wrong name: the error lists the right ones.
     let is_name = !file.exists() && file.extension().is_none() && file.components().count() <= 1;
     if is_shipped || is_name {

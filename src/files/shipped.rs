@@ -165,18 +165,19 @@ impl Source {
         }
     }
 
-    /// A file on disk where `name_or_path` ends in `.toml` or is the path of a file, else the shipped file of that
-    /// name.
+    /// The shipped file of that name, so that names work wherever the program runs; else a file on disk, where
+    /// `name_or_path` ends in `.toml` or is the path of a file.
     ///
     /// # Errors
     ///
     /// [`Error::UnknownName`]. Whether a path can be read is found out by [`Source::text`].
     pub fn find(kind: Kind, name_or_path: &str) -> Result<Source, Error> {
         let path = Path::new(name_or_path);
-        if path.extension().is_some_and(|extension| extension == "toml") || path.is_file() {
-            return Ok(Source::Disk(path.to_owned()));
+        let is_path = || path.extension().is_some_and(|extension| extension == "toml") || path.is_file();
+        match Source::named(kind, name_or_path) {
+            Err(_) if is_path() => Ok(Source::Disk(path.to_owned())),
+            found => found,
         }
-        Source::named(kind, name_or_path)
     }
 
     /// The file that this one refers to by `path`, relative to its own folder: on disk from a file on disk, embedded

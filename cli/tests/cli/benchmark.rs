@@ -1,6 +1,14 @@
-//! `offtrack train --benchmark`: a benchmark of one's own, and validation that must drive as it says.
+//! Benchmarks by their names, `offtrack train --benchmark` of one's own, and validation that must drive as it says.
 
-use crate::place::{Place, offtrack, refusal, succeed};
+use crate::place::{Place, offtrack, program, refusal, succeed};
+
+#[test]
+fn a_shipped_name_is_what_comes_with_the_program_whatever_lies_in_the_folder() {
+    let place = Place::new();
+    std::fs::write(place.file("attard2023"), "neither a benchmark nor a policy").unwrap();
+    let named = ["evaluate", "--benchmark", "attard2023", "--policy", "attard2023", "--episodes", "1"];
+    succeed(&program().current_dir(place.file("")).args(named).output().unwrap());
+}
 
 #[test]
 fn validation_that_drives_another_vehicle_or_otherwise_is_refused_before_a_folder_is_made() {

@@ -91,7 +91,7 @@ fn beside(file: &Path, base: &str) -> PathBuf {
 /// The text of a training file that comes with the program, by its name.
 fn shipped(name: &Path) -> Option<&'static str> {
     let name = name.to_str()?;
-    SHIPPED.iter().find(|(known, _)| *known == name && !Path::new(name).is_file()).map(|(_, text)| *text)
+    SHIPPED.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
 }
 
 fn table(file: &Path) -> Result<Table, Error> {
