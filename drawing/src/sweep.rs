@@ -9,7 +9,7 @@ use offtrack::map::UnitKerbs;
 use offtrack::map::route::Route;
 use offtrack::vehicle::Vehicle;
 use offtrack::vehicle::swept::{
-    self, Demand, Limit, Pose, UnitClearance, demands, front_path, hull, own_lane_suffices, swept_path,
+    self, Demand, Limit, Pose, UnitClearance, demands, front_path, own_lane_suffices, swept_path,
 };
 use offtrack_evaluation::polygons::{Polygon, rounded as polygon};
 use serde::Serialize;
@@ -277,7 +277,5 @@ impl Unit {
 
 /// Path data of the area that a rectangle sweeps through the poses `corners`, for the non-zero fill rule.
 pub(crate) fn swept_area(view: &View, corners: &[[DVec2; 4]]) -> String {
-    // Hulls of neighbouring poses leave no teeth where a corner swings out. All have one orientation: the non-zero fill
-    // is their union.
-    corners.windows(2).map(|pair| view.polygon(&hull(pair.concat()))).collect()
+    swept::swept_area(corners).iter().map(|ring| view.polygon(ring)).collect()
 }

@@ -64,8 +64,7 @@ fn limits(rig: &Rig, waypoints: &[WaypointRow], lengths: &[f64]) -> Vec<f64> {
     let heading = |index: usize| f64::from(waypoints[index].direction.y).atan2(waypoints[index].direction.x.into());
     let turn = |from: f64, to: f64| (to - from + 3.0 * PI).rem_euclid(2.0 * PI) - PI;
     let grip = GRIP_MAX * f64::from(rig.lateral_acceleration_max);
-    let held = (LOAD_TRANSFER_MAX * f64::from(rig.rollover_threshold) * GRAVITY - f64::from(rig.crossfall).abs())
-        .max(0.05 * GRAVITY);
+    let (level, fall) = (LOAD_TRANSFER_MAX * f64::from(rig.rollover_threshold) * GRAVITY, f64::from(rig.crossfall));
     let last = waypoints.len() - 1;
     let mut articulation = 0.0f64;
     let limit = |index: usize| {
@@ -78,6 +77,8 @@ fn limits(rig: &Rig, waypoints: &[WaypointRow], lengths: &[f64]) -> Vec<f64> {
             let followed = articulation.sin() * lengths[index - 1] / f64::from(rig.trailer_wheelbase);
             articulation += turned - followed;
         }
+        // A road that falls to the right takes from what a bend to the left may have, and gives it to one to the right.
+        let held = (level - articulation.signum() * fall).max(0.05 * GRAVITY);
         let trailer_curvature = (articulation.sin() * articulation.cos()).abs() / f64::from(rig.trailer_wheelbase);
         (grip / curvature.max(1e-6)).min(held / trailer_curvature.max(1e-6)).sqrt()
     };
@@ -124,6 +125,21 @@ mod tests {
         }
         let mean = 292.0 / time;
         assert!(slowest < mean && mean < speeds[0], "{mean}");
+    }
+
+    #[test]
+    fn a_road_that_falls_outwards_slows_a_bend_down_and_one_that_falls_inwards_does_not() {
+        let mut vehicle = Vehicle::named("daf_xf").unwrap();
+        let mut slowest = |crossfall: f64| {
+            vehicle.model.crossfall = crossfall;
+            let rig = vehicle.rig("laden", 0.05, None);
+            Profile::of(&rig, &waypoints(), 50.0 / 3.6).speeds[80].powi(2)
+        };
+        // The bend is to the left, and a positive fall to the right.
+        let [outwards, level, inwards] = [0.04, 0.0, -0.04].map(&mut slowest);
+        let held = 0.7 * 0.412;
+        assert!((outwards / level - (held - 0.04) / held).abs() < 2e-3, "{outwards} {level}");
+        assert!((inwards / level - (held + 0.04) / held).abs() < 2e-3, "{inwards} {level}");
     }
 
     #[test]

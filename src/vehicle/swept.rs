@@ -13,7 +13,7 @@ use glam::DVec2;
 
 use crate::geometry::{Curve, Outline};
 use crate::layout::{Body, Rig};
-pub use clearance::{UnitClearance, hull, nearest, swept_area};
+pub use clearance::{UnitClearance, nearest, swept_area};
 pub use demand::{Demand, Limit, demands, steer_angle_max};
 pub use extent::{Section, beside, front_path, off_tracking, sections};
 

@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use crate::geometry::Outline;
-use crate::geometry::area::{Area, points};
+use crate::geometry::area::{Area, counter_clockwise, points};
 
 /// Distance between the points of an outline at which clearance is computed (m).
 const BETWEEN_POINTS: f64 = 0.05;
@@ -76,12 +76,12 @@ pub fn nearest(corners: &[DVec2; 4], kerbs: &Outline) -> (DVec2, f64) {
 }
 
 /// The area that a rectangle sweeps from pose to pose as polygons within 5 mm: boundaries counter-clockwise, holes
-/// clockwise, none with its first point repeated (m).
+/// clockwise, none with its first point repeated (m). Poses are so near to each other that corners move straight.
 pub fn swept_area(path: &[[DVec2; 4]]) -> Vec<Vec<DVec2>> {
-    // Halves are united with halves: all at once, every hull would be cut by all that it overlaps.
+    // Halves are united with halves: all at once, every part would be cut by all that it overlaps.
     fn united(path: &[[DVec2; 4]]) -> Area {
         if path.len() <= 3 {
-            return Area::union(path.windows(2).map(|pair| hull(pair.concat())));
+            return Area::union(path.windows(2).flat_map(|pair| swept_between(&pair[0], &pair[1])));
         }
         let middle = path.len() / 2;
         united(&path[..=middle]).plus(&united(&path[middle..]))
@@ -89,42 +89,42 @@ pub fn swept_area(path: &[[DVec2; 4]]) -> Vec<Vec<DVec2>> {
     united(path).simplified(SIMPLIFIED).parts.iter().flatten().map(|contour| points(contour)).collect()
 }
 
-/// The corners of the convex hull, counter-clockwise (A. M. Andrew, "Another efficient algorithm for convex hulls in
-/// two dimensions", 1979).
-pub fn hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
-    points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
-    let chain = |points: &mut dyn Iterator<Item = DVec2>| {
-        let mut kept: Vec<DVec2> = Vec::new();
-        for p in points {
-            while let [.., a, b] = kept[..]
-                && (b - a).perp_dot(p - b) <= 0.0
-            {
-                kept.pop();
-            }
-            kept.push(p);
-        }
-        // The chain's last point is the other chain's first.
-        kept.pop();
-        kept
-    };
-    let mut hull = chain(&mut points.iter().copied());
-    hull.extend(chain(&mut points.iter().rev().copied()));
-    hull
+/// What a rectangle sweeps between two poses: itself at both, and what each side sweeps. Their hull would fill what
+/// lies between the inner sides of one that turns.
+fn swept_between(from: &[DVec2; 4], to: &[DVec2; 4]) -> Vec<Vec<DVec2>> {
+    let mut parts = vec![from.to_vec(), to.to_vec()];
+    for side in 0..4 {
+        let next = (side + 1) % 4;
+        parts.extend(swept_by_side([from[side], from[next]], [to[side], to[next]]));
+    }
+    parts.into_iter().map(counter_clockwise).collect()
+}
+
+/// What a side sweeps whose ends move straight.
+fn swept_by_side([a, b]: [DVec2; 2], [c, d]: [DVec2; 2]) -> Vec<Vec<DVec2>> {
+    // One that turns about a point of its own sweeps two triangles, and so does one whose ends change places.
+    if let Some(p) = crossing([a, b], [c, d]) {
+        vec![vec![a, p, c], vec![b, p, d]]
+    } else if let Some(p) = crossing([a, c], [b, d]) {
+        vec![vec![a, p, b], vec![c, p, d]]
+    } else {
+        vec![vec![a, b, d, c]]
+    }
+}
+
+/// Where two segments cross, if they do.
+fn crossing([a, b]: [DVec2; 2], [c, d]: [DVec2; 2]) -> Option<DVec2> {
+    let (one, other) = (b - a, d - c);
+    let turn = one.perp_dot(other);
+    let [along, along_other] = [(c - a).perp_dot(other) / turn, (c - a).perp_dot(one) / turn];
+    // Parallel ones cross nowhere: no range holds an infinite or undefined number.
+    ((0.0..=1.0).contains(&along) && (0.0..=1.0).contains(&along_other)).then(|| a + along * one)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::geometry::{Curve, Piece};
-
-    #[test]
-    fn a_hull_of_two_squares_has_their_outer_corners_counter_clockwise() {
-        let square = [(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0)].map(|(x, y)| DVec2::new(x, y));
-        let shifted = square.map(|p| p + DVec2::new(1.0, 0.5));
-        let expected =
-            [(0.0, 0.0), (2.0, 0.0), (3.0, 0.5), (3.0, 2.5), (1.0, 2.5), (0.0, 2.0)].map(|(x, y)| DVec2::new(x, y));
-        assert_eq!(hull([square, shifted].concat()), expected);
-    }
 
     #[test]
     fn the_point_of_a_body_nearest_to_a_kerb_may_lie_on_a_side() {
@@ -170,5 +170,25 @@ mod tests {
         let size: f64 = (0..n).map(|i| area[0][i].perp_dot(area[0][(i + 1) % n])).sum::<f64>() / 2.0;
         // Corners lie on a grid of 0.06 mm.
         assert!((size - 4.0).abs() < 1e-3 && n == 4, "{area:?}");
+    }
+
+    #[test]
+    fn a_rectangle_on_a_circle_sweeps_up_to_its_inner_side() {
+        // 13 m long and 2.5 m wide, its middle on a circle of 13 m, poses 0.2 m apart.
+        let pose = |angle: f64| {
+            let (centre, along) = (13.0 * DVec2::from_angle(angle), DVec2::from_angle(angle).perp());
+            [(6.5, 1.25), (6.5, -1.25), (-6.5, -1.25), (-6.5, 1.25)].map(|(x, y)| centre + x * along - y * along.perp())
+        };
+        let path: Vec<[DVec2; 4]> = (0..=400).map(|index| pose(f64::from(index) * 0.2 / 13.0)).collect();
+        let area = swept_area(&path);
+        let [inner, outer] = [false, true].map(|outer| {
+            let radii = area.iter().flatten().map(|p| p.length());
+            radii.fold(
+                if outer { 0.0 } else { f64::INFINITY },
+                |found, r| if outer { r.max(found) } else { r.min(found) },
+            )
+        });
+        assert_eq!(area.len(), 2, "the circle is closed");
+        assert!((inner - 11.75).abs() < 0.006 && (outer - 14.25f64.hypot(6.5)).abs() < 0.006, "{inner} {outer}");
     }
 }
