@@ -21,9 +21,6 @@ use offtrack_evaluation::files;
 use crate::outputs;
 use drawing::DrawingArgs;
 
-/// A ring that is farther than this from the place that was given for it is said to be (m).
-const FAR: f64 = 100.0;
-
 /// List the roundabouts or junctions of an OpenDRIVE map, check it, or write one of them as an outline file.
 #[derive(Debug, clap::Args)]
 #[command(group(clap::ArgGroup::new("action").args(["list", "junctions", "check", "output"]).required(true)))]
@@ -178,11 +175,6 @@ pub fn run(args: &Args) -> Result<(), Error> {
     files::write_whole(output, text(&args.map, output, &map, &choice, &imported)?.as_bytes())?;
     if let Some(file) = &args.json {
         files::write_json(file, &Written::of(&imported))?;
-    }
-    let far = args.place.ring.map(|near| near.distance(imported.centre)).filter(|far| FAR < *far);
-    if let Some(far) = far {
-        let (x, y) = (imported.centre.x, imported.centre.y);
-        files::say(&format!("--ring: the nearest ring, at {x:.1},{y:.1}, is {far:.0} m away"));
     }
     files::print(&summary(output, &imported, "warning"))
 }

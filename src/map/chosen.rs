@@ -8,6 +8,9 @@ use super::Road;
 use crate::files::reader::{Error, Reader};
 use crate::map::opendrive::{Hand, Imported, Map, Options, Ring, Way};
 
+/// Farthest that a point which chooses a ring may lie from its island's edge (m).
+pub(super) const FARTHEST: f64 = 100.0;
+
 /// Which ring of a map, and how it is imported.
 #[derive(Debug, Clone, Default)]
 pub struct Choice {
@@ -33,19 +36,26 @@ impl Choice {
     ///
     /// # Errors
     ///
-    /// A map without a ring, or with several where none is chosen.
+    /// A map without a ring, with several where none is chosen, or without one near the point that chooses it.
     pub fn of(&self, file: &Path, map: &Map) -> Result<Ring, Error> {
-        if let Some(p) = self.ring {
-            return map.nearest(p);
+        let listed = || {
+            let rings = map.rings();
+            let centres = rings.iter().map(|ring| format!("{:.1},{:.1}", ring.centre.x, ring.centre.y));
+            centres.collect::<Vec<String>>().join("  ")
+        };
+        let nearest = map.nearest(self.ring.unwrap_or(DVec2::ZERO))?;
+        match self.ring {
+            None if 1 < map.rings().len() => {
+                let expected = format!("the map has several; one of {}", listed());
+                Err(Reader::of(file).invalid("ring", "missing", expected))
+            }
+            Some(p) if FARTHEST < nearest.centre.distance(p) - nearest.radius => {
+                let expected =
+                    format!("must be within {FARTHEST} m of a roundabout's island; the map has {}", listed());
+                Err(Reader::of(file).invalid("ring", format_args!("({}, {})", p.x, p.y), expected))
+            }
+            _ => Ok(nearest),
         }
-        let rings = map.rings();
-        if let [_, _, ..] = rings.as_slice() {
-            let listed: Vec<String> =
-                rings.iter().map(|ring| format!("{:.1},{:.1}", ring.centre.x, ring.centre.y)).collect();
-            let expected = format!("the map has several; one of {}", listed.join("  "));
-            return Err(Reader::of(file).invalid("ring", "missing", expected));
-        }
-        map.nearest(DVec2::ZERO)
     }
 
     /// The ring or the ways that are meant, with arms and routes.

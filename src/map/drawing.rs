@@ -92,6 +92,8 @@ fn parse(file: &Path, text: &str, layers: &Layers) -> Result<Drawn, Error> {
 struct Entity {
     curve: Curve,
     is_closed: bool,
+    /// Whether it runs counter-clockwise whichever way it leads, as an ARC of a DXF file.
+    is_arc: bool,
     /// Where it stands in the file: `line 12`, `feature 3`.
     place: String,
     /// Widths of a lane on its entry arm, in the ring and on its exit arm, where it says them (m).

@@ -28,6 +28,7 @@ mod bypass; // lanes that pass beside a ring
 mod names; // names of arms
 mod lines; // ways -> routes
 mod surroundings; // a map around a point
+mod bridges; // roads above others
 mod build; // a ring as a `Ground`
 mod junction; // ways through a junction as a `Ground`
 mod export; // a road as a map

@@ -137,7 +137,7 @@ fn bad_features_are_refused_by_their_number_and_what_would_do() {
     };
     let geometry = |features: &mut Value, index: usize| features["features"][index]["geometry"].take();
     type Change = Box<dyn Fn(&mut Value)>;
-    let cases: [(Change, &str); 14] = [
+    let cases: [(Change, &str); 15] = [
         (Box::new(|f| f["type"] = "Feature".into()), "type: \"Feature\"; must be \"FeatureCollection\""),
         (
             Box::new(|f| drop(f["features"][0]["geometry"]["coordinates"][1].as_array_mut().unwrap().pop())),
@@ -166,6 +166,10 @@ fn bad_features_are_refused_by_their_number_and_what_would_do() {
         (
             Box::new(|f| f["crs"] = json!({"type": "name", "properties": {"name": "EPSG:4326"}})),
             "crs: EPSG:4326; coordinates must be metres, not degrees",
+        ),
+        (
+            Box::new(|f| f["crs"] = json!({"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::3857"}})),
+            "crs: urn:ogc:def:crs:EPSG::3857; lengths are not true in it",
         ),
     ];
     for (change, expected) in cases {

@@ -33,7 +33,7 @@ pub fn arms(imported: &Imported) -> Vec<&str> {
 }
 
 /// `text` with every `from` of road 1 replaced, which leads east from (38, 0).
-fn in_road_1(text: &str, from: &str, to: &str) -> String {
+pub fn in_road_1(text: &str, from: &str, to: &str) -> String {
     let replaced =
         |line: &str| if line.contains(" id=\"1\" junction") { line.replace(from, to) } else { line.to_owned() };
     let changed = text.lines().map(replaced).collect::<Vec<_>>().join("\n");

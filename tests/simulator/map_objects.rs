@@ -4,7 +4,7 @@ use glam::DVec2;
 use offtrack::geometry::Curve;
 use offtrack::map::opendrive::Options;
 
-use crate::map_kinds::{imported, parsed, plain};
+use crate::map_kinds::{imported, in_road_1, parsed, plain};
 
 /// The ring with a road far from it, 100 m long, that has these objects.
 fn beside(x: f64, objects: &str) -> String {
@@ -211,4 +211,57 @@ fn an_offset_of_the_header_is_said_not_to_be_applied() {
         |warnings: &[String]| warnings.iter().any(|warning| warning.contains("offset (1000, 2000, 0) m, 0.5 rad"));
     assert!(said(&imported(&map).warnings), "{:?}", imported(&map).warnings);
     assert_eq!((parsed(&text).header_offset(), said(&imported(&parsed(&text)).warnings)), (None, false));
+}
+
+/// The ring with a road of one lane that leads north over its eastern arm, at this height.
+fn passed_at(height: f64) -> String {
+    let lane = "<lane id=\"-1\" type=\"driving\"><width sOffset=\"0\" a=\"3.5\" b=\"0\" c=\"0\" d=\"0\"/></lane>";
+    let road = format!(
+        "<road id=\"7000\" junction=\"-1\" length=\"120\"><planView><geometry s=\"0\" x=\"62\" y=\"-60\" \
+         hdg=\"1.5707963267949\" length=\"120\"><line/></geometry></planView><elevationProfile><elevation s=\"0\" \
+         a=\"{height}\" b=\"0\" c=\"0\" d=\"0\"/></elevationProfile><lanes><laneSection s=\"0\"><center><lane id=\"0\" \
+         type=\"none\"/></center><right>{lane}</right></laneSection></lanes></road>"
+    );
+    plain().replace("</OpenDRIVE>", &format!("{road}</OpenDRIVE>"))
+}
+
+#[test]
+fn a_road_that_passes_above_another_is_warned_of_by_its_height() {
+    let said = |height: f64| {
+        let warnings = imported(&parsed(&passed_at(height))).warnings;
+        warnings.into_iter().filter(|warning| warning.contains(" above ")).collect::<Vec<_>>().join("\n")
+    };
+    assert!(
+        said(8.0).ends_with(": road 7000 passes 8.0 m above road 1; the simulated road is level, and both are paved"),
+        "{}",
+        said(8.0)
+    );
+    assert!(
+        said(-6.0).ends_with("road 1 passes 6.0 m above road 7000; the simulated road is level, and both are paved")
+    );
+    assert_eq!([said(1.0), said(0.0)], ["", ""].map(str::to_owned));
+}
+
+#[test]
+fn lanes_that_forbid_trucks_and_widths_that_are_odd_are_warned_of() {
+    let said = |from: &str, to: &str| parsed(&in_road_1(&plain(), from, to)).warnings().collect::<Vec<_>>().join("\n");
+    let width = "<width sOffset=\"0\" a=\"4\" b=\"0\" c=\"0\" d=\"0\"/>";
+    let deny = format!("{width}<access sOffset=\"0\" rule=\"deny\" restriction=\"truck\"/>");
+    for (to, expected) in [
+        (deny.as_str(), "forbids trucks; it is driven on as other lanes are"),
+        (&width.replace("sOffset=\"0\"", "sOffset=\"2\""), "its width begins at sOffset 2 m"),
+        (&format!("{width}{}", width.replace("\"0\" a=\"4\"", "\"60\" a=\"-1\"")), "width at sOffset 60 m is -1 m"),
+    ] {
+        let said = said(width, to);
+        assert!(said.contains("road 1") && said.contains(expected), "{expected}: {said}");
+    }
+}
+
+#[test]
+fn the_hand_of_traffic_is_read_in_any_case_and_an_unknown_rule_is_warned_of() {
+    let of = |rule: &str| parsed(&plain().replace("<road ", &format!("<road rule=\"{rule}\" ")));
+    let [lower, upper, right] = ["lht", "LHT", "RHT"].map(|rule| of(rule).lane_centres(0.01));
+    assert!(lower == upper && lower != right);
+    let said = of("left").warnings().collect::<Vec<_>>().join("\n");
+    assert!(said.contains("its rule left is neither RHT nor LHT; it counts as RHT"), "{said}");
 }

@@ -219,14 +219,15 @@ fn drawn_blocks<'a>(pairs: &[Pair<'a>], layers: &Layers) -> HashSet<&'a str> {
     let mut inserted: Vec<(&str, &str)> = Vec::new();
     let mut block = "";
     for entity in section(pairs, "BLOCKS") {
+        let layer = text_of(entity, 8).unwrap_or_default();
+        let is_drawn = [&layers.kerbs, &layers.lanes, &layers.aprons].iter().any(|one| layer.eq_ignore_ascii_case(one));
         match entity[0].value {
             "BLOCK" => block = text_of(entity, 2).unwrap_or_default(),
+            // What stands on layer 0 of a block takes the layer of the insertion.
+            "INSERT" if is_drawn => drop(drawn.insert(block)),
             "INSERT" => inserted.push((block, text_of(entity, 2).unwrap_or_default())),
-            "LINE" | "ARC" | "CIRCLE" | "LWPOLYLINE" | "POLYLINE" | "SPLINE" | "ELLIPSE" => {
-                let layer = text_of(entity, 8).unwrap_or_default();
-                if [&layers.kerbs, &layers.lanes, &layers.aprons].iter().any(|one| layer.eq_ignore_ascii_case(one)) {
-                    drawn.insert(block);
-                }
+            "LINE" | "ARC" | "CIRCLE" | "LWPOLYLINE" | "POLYLINE" | "SPLINE" | "ELLIPSE" if is_drawn => {
+                drawn.insert(block);
             }
             _ => {}
         }
@@ -312,7 +313,7 @@ fn curve(file: &Path, entity: &[Pair], vertices: &[&[Pair]], metres: f64) -> Res
     if curve.pieces.is_empty() {
         return Err(refused("has no length: delete it"));
     }
-    Ok(Some(Entity { curve, is_closed, place: format!("line {line}"), widths: None }))
+    Ok(Some(Entity { curve, is_closed, is_arc: kind == "ARC", place: format!("line {line}"), widths: None }))
 }
 
 /// The curve through vertices, each with the bulge of the arc to the next: the tangent of a quarter of its angle.

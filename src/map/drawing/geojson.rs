@@ -91,7 +91,8 @@ pub(super) fn drawing(file: &Path, text: &str, layers: &Layers) -> Result<Drawin
     reader.count("features", collection.features.len(), 1..=MOST_FEATURES)?;
     let mut drawing = Drawing::default();
     let frame = frame(&reader, collection.crs.as_ref())?;
-    drawing.notes.extend(frame.map(|name| format!("coordinates are those of {name}, in which `origin` lies")));
+    let taken = if layers.unit.is_none() { ", and are taken for metres" } else { "" };
+    drawing.notes.extend(frame.map(|name| format!("coordinates are those of {name}, in which `origin` lies{taken}")));
     let metres = layers.unit.map_or(1.0, Unit::metres);
     let mut others: BTreeMap<&str, usize> = BTreeMap::new();
     let mut left = LONGEST;
@@ -144,13 +145,21 @@ pub(super) fn drawing(file: &Path, text: &str, layers: &Layers) -> Result<Drawin
 fn frame(reader: &Reader, crs: Option<&Value>) -> Result<Option<String>, Error> {
     let name = crs.and_then(|crs| crs.get("properties")?.get("name")?.as_str());
     let Some(name) = name.map(|name| shortened(&name.escape_debug().to_string(), 80)) else { return Ok(None) };
-    let is_degrees = ["CRS84", "CRS83", "CRS27"].iter().any(|known| name.ends_with(known))
-        || name.rsplit(':').next().is_some_and(|code| ["4326", "4258", "4269"].contains(&code));
-    if is_degrees {
+    let code = name.rsplit([':', '/']).next().unwrap_or_default();
+    if ["CRS84", "CRS83", "CRS27"].iter().any(|known| name.ends_with(known)) || DEGREES.contains(&code) {
         return Err(reader.invalid("crs", name, PROJECT));
+    }
+    if MERCATOR.contains(&code) {
+        let expected = "lengths are not true in it: project the file, as by ogr2ogr -t_srs EPSG:25832 site.geojson \
+                        mercator.geojson";
+        return Err(reader.invalid("crs", name, expected));
     }
     Ok(Some(name))
 }
+
+/// EPSG's codes of frames in degrees that maps have, and those of Mercator's projections of the whole earth.
+const DEGREES: [&str; 9] = ["4326", "4258", "4269", "4267", "4230", "4277", "4283", "4490", "4979"];
+const MERCATOR: [&str; 6] = ["3857", "3395", "3785", "900913", "102100", "102113"];
 
 /// What would do in place of degrees.
 const PROJECT: &str = "coordinates must be metres, not degrees: project them, as by ogr2ogr -t_srs EPSG:25832 \
@@ -224,7 +233,7 @@ impl Shape<'_> {
                 "its positions must differ",
             ));
         }
-        Ok(Entity { curve, is_closed, place: self.place.to_owned(), widths })
+        Ok(Entity { curve, is_closed, is_arc: false, place: self.place.to_owned(), widths })
     }
 
     /// The lists of points of a geometry of one of these kinds, each with its key.

@@ -10,6 +10,7 @@ use crate::files::reader::{Error, Reader};
 use crate::geometry::area::densified;
 use crate::geometry::{Curve, Outline, Piece, fitted_line, wrapped};
 use crate::map::apron;
+use crate::map::chosen::FARTHEST;
 use crate::map::ground::{Arm, Edges, Ground, Kerb, Line};
 use crate::map::opendrive::{closest, fitted_circle, kerb_of, named, outer_radius, ring_radius};
 use crate::map::route::Lane;
@@ -49,15 +50,21 @@ pub struct Drawn {
 /// The road of a drawing.
 pub(super) fn drawn(file: &Path, drawing: Drawing, layers: &Layers) -> Result<Drawn, Error> {
     let reader = Reader::of(file);
-    let Drawing { kerbs, lanes, aprons, centre: marked, mut notes } = drawing;
+    let Drawing { kerbs, mut lanes, aprons, centre: marked, mut notes } = drawing;
     reader.count(&format!("lines on layer {}", layers.kerbs), kerbs.len(), 1..=MOST_KERBS)?;
     reader.count(&format!("lines on layer {}", layers.lanes), lanes.len(), 1..=MOST_WAYS)?;
     reader.count(&format!("lines on layer {}", layers.aprons), aprons.len(), 0..=MOST_APRONS)?;
+    lead_arcs(&mut lanes);
     let lanes = whole(lanes, &layers.lanes, &mut notes);
     let loops = closed(&reader, kerbs, &layers.kerbs, &mut notes)?;
     let aprons = closed(&reader, aprons, &layers.aprons, &mut notes)?;
     let (loops, aprons) = aprons::placed(loops, aprons);
     let (centre, radius) = island(&reader, &loops, layers, layers.ring.or(marked))?;
+    if let Some(p) = layers.ring.filter(|p| FARTHEST < p.distance(centre) - radius) {
+        let (x, y) = (centre.x, centre.y);
+        let expected = format!("must be within {FARTHEST} m of the island; the nearest is at ({x:.1}, {y:.1}) m");
+        return Err(reader.invalid("ring", format_args!("({}, {})", p.x, p.y), expected));
+    }
     let place = |curve: &Curve| moved(curve, -centre);
     let loops: Vec<Curve> = loops.iter().map(place).collect();
     let ways: Vec<Curve> = lanes.iter().map(|lane| place(&smooth(lane, &mut notes))).collect();
@@ -189,6 +196,30 @@ fn crosses_itself(curve: &Curve) -> Option<DVec2> {
         beside.filter(|&&b| is_near(a, b)).find_map(|&b| crossing((a, b)))
     };
     order.iter().enumerate().find_map(of_one)
+}
+
+/// Reverses arcs that lead against what they meet.
+fn lead_arcs(drawn: &mut [Entity]) {
+    let ends = |one: &Entity| [one.curve.point_at(0.0), one.curve.point_at(one.curve.length())];
+    let mut is_settled: Vec<bool> = drawn.iter().map(|one| !one.is_arc).collect();
+    loop {
+        let met = |arc: usize| {
+            let [begins, stops] = ends(&drawn[arc]);
+            // Whether something whose direction is known has its beginning (0) or its end (1) there.
+            let meets = |p: DVec2, end: usize| {
+                let settled = drawn.iter().zip(&is_settled).filter(|(_, is_settled)| **is_settled);
+                settled.map(|(one, _)| ends(one)[end]).any(|other| other.distance(p) <= GAP)
+            };
+            let follows = meets(begins, 1) || meets(stops, 0);
+            let opposes = meets(stops, 1) || meets(begins, 0);
+            (follows || opposes).then_some((arc, !follows))
+        };
+        let Some((arc, is_reversed)) = (0..drawn.len()).filter(|&arc| !is_settled[arc]).find_map(met) else { break };
+        if is_reversed {
+            drawn[arc].curve = drawn[arc].curve.reversed();
+        }
+        is_settled[arc] = true;
+    }
 }
 
 /// Ways, of which those that are drawn in parts are one each: an end at which one other begins, and nothing else meets.

@@ -1,5 +1,7 @@
 //! Drawings as other programs write them, and drawings that are refused.
 
+mod parts;
+
 use std::fmt::Write;
 use std::path::Path;
 
@@ -368,28 +370,4 @@ fn a_drawing_may_begin_with_a_byte_order_mark_and_names_of_layers_may_be_in_the_
     let bytes: Vec<u8> = text.replace("KERB", "Bordüre").chars().map(|c| u8::try_from(u32::from(c)).unwrap()).collect();
     let named = Layers { kerbs: "BORDüRE".into(), ..layers() };
     assert!(std::str::from_utf8(&bytes).is_err() && parse(file, &super::text(file, &bytes), &named).is_ok());
-}
-
-#[test]
-fn ways_in_parts_are_joined_where_one_ends_and_one_begins() {
-    let road = Road::named("20m").unwrap();
-    let kerbs: String = road.ground().faces.loops.iter().map(|curve| polyline("KERB", curve, true, 1.0)).collect();
-    let lines: Vec<&Curve> = road.ground().lines.iter().map(|line| &line.line).collect();
-    let parts = |n: usize| -> String {
-        let of = |curve: &&Curve| -> String {
-            let length = curve.length() / n as f64;
-            // The last one first.
-            let part = |k: usize| curve.part(length * k as f64, length * (k + 1) as f64);
-            (0..n).rev().map(|k| polyline("LANE", &part(k), false, 1.0)).collect()
-        };
-        // Of each arm's ways the first ones share their way in.
-        lines.iter().step_by(5).map(of).collect()
-    };
-    let (whole, cut) = (read(&(kerbs.clone() + &parts(1)), &layers()), read(&(kerbs + &parts(3)), &layers()));
-    let (whole, cut) = (whole.unwrap(), cut.unwrap());
-    assert_eq!((cut.ground.lines.len(), cut.ground.arms.len()), (whole.ground.lines.len(), whole.ground.arms.len()));
-    assert!(cut.notes.iter().any(|note| note.contains("lines on layer LANE are joined to ")), "{:?}", cut.notes);
-    for (one, other) in cut.ground.lines.iter().zip(&whole.ground.lines) {
-        assert!((one.line.length() - other.line.length()).abs() < 1e-6);
-    }
 }

@@ -4,6 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::DVec2;
 
+use super::bridges::bridges;
 use super::bypass::Around;
 use super::crossings::{ArmLanes, Crossing, arms, circle, crossings, joined};
 use super::lanes::Strip;
@@ -172,7 +173,8 @@ impl Site<'_> {
                 "{place}: the header's offset ({x}, {y}, {z}) m, {turn} rad is not applied: coordinates are the file's"
             )
         }));
-        routes.warnings.extend(tilt(map, network).map(|tilt| format!("{}: {tilt}", refused.place)));
+        let uneven = tilt(map, network).into_iter().chain(bridges(map, network));
+        routes.warnings.extend(uneven.map(|what| format!("{}: {what}", refused.place)));
         let Lines { mut lines, warnings, .. } = routes;
         lines.sort_by_key(|line| (line.entry, line.lane == Lane::Right, line.exit));
         let kerbs = faces.loops.iter().map(|curve| kerb_of(curve, &arms)).collect();

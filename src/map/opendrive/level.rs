@@ -76,7 +76,7 @@ impl Source<'_, '_> {
         if GRADE < grade {
             self.warn(node, &format!("has a grade of {:.1} %; the simulated road is level", 100.0 * grade));
         }
-        Ok(Level { grade, crossfall: self.crossfall(node, road)? })
+        Ok(Level { grade, crossfall: self.crossfall(node, road)?, elevation })
     }
 
     /// The largest rise across a road.

@@ -54,7 +54,9 @@ impl Source<'_, '_> {
 
     fn geometry(&mut self, node: Node) -> Result<Geometry, Error> {
         let length = self.length(node, "length")?;
-        let form = node.children().find(|child| child.is_element() && child.tag_name().name() != "userData");
+        // What any element may have beside its own.
+        let extra = ["userData", "dataQuality", "include"];
+        let form = node.children().find(|child| child.is_element() && !extra.contains(&child.tag_name().name()));
         let mut sharpest: f64 = 0.0;
         let mut curvature = |form: Node, key: &str| -> Result<f64, Error> {
             let curvature = self.number(form, key, None, LARGEST_CURVATURE)?;

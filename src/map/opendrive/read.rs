@@ -183,7 +183,13 @@ impl Source<'_, '_> {
 
     /// Whether most of the map's roads have left-hand traffic.
     fn left_hand(&mut self, root: Node) -> bool {
-        let rules: Vec<bool> = children(root, "road").map(|road| attribute(road, "rule") == "LHT").collect();
+        let rule = |road: Node| attribute(road, "rule").to_ascii_uppercase();
+        let rules: Vec<bool> = children(root, "road").map(|road| rule(road) == "LHT").collect();
+        let unknown = |road: &Node| !["", "LHT", "RHT"].contains(&rule(*road).as_str());
+        if let Some(road) = children(root, "road").find(unknown) {
+            let rule = shown(attribute(road, "rule"));
+            self.warn(road, &format!("its rule {rule} is neither RHT nor LHT; it counts as RHT"));
+        }
         let left = rules.iter().filter(|&&left| left).count();
         if 0 < left && left < rules.len() {
             let both = format!(

@@ -24,13 +24,15 @@ impl Cubic {
     }
 }
 
-/// The steepest that a road is.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+/// How a road lies in space.
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Level {
     /// Largest rise along the road, as a fraction of the length.
     pub(super) grade: f64,
     /// Largest rise across the road, by its superelevation and its shape together at most, as a fraction of the width.
     pub(super) crossfall: f64,
+    /// Heights of its reference line; none where the map says nothing of them.
+    pub(super) elevation: Vec<Cubic>,
 }
 
 /// The record that holds at `s` of those sorted by `start`: the last that begins at or before it, or the first.
@@ -172,6 +174,11 @@ pub(super) struct RoadRecord {
 }
 
 impl RoadRecord {
+    /// Height of the reference line at a station (m).
+    pub(super) fn height(&self, s: f64) -> f64 {
+        active(&self.level.elevation, s, |elevation| elevation.start).map_or(0.0, |elevation| elevation.at(s))
+    }
+
     /// Station where a section ends (m).
     pub(super) fn section_end(&self, section: usize) -> f64 {
         self.sections.get(section + 1).map_or(self.length, |next| next.start)

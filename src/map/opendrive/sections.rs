@@ -23,14 +23,14 @@ struct Written {
     sides: [bool; 2],
 }
 
-/// Whether a lane's access records allow trucks on it.
-fn is_for_trucks(lane: Node) -> bool {
-    let allows = |access: Node| {
+/// Whether a lane's access records have this rule for trucks.
+fn has_for_trucks(lane: Node, rule: &str) -> bool {
+    let is_for_trucks = |access: Node| {
         let restrictions = children(access, "restriction").map(|node| attribute(node, "type"));
-        attribute(access, "rule") == "allow"
+        attribute(access, "rule") == rule
             && restrictions.chain([attribute(access, "restriction")]).any(|of| ["truck", "trucks"].contains(&of))
     };
-    children(lane, "access").any(allows)
+    children(lane, "access").any(is_for_trucks)
 }
 
 impl Source<'_, '_> {
@@ -100,6 +100,14 @@ impl Source<'_, '_> {
             self.warn(node, "has neither width nor border; it counts as having none");
         }
         let widths = if bordered { borders } else { widths };
+        if let Some(first) = widths.first().filter(|first| SHORTEST < first.start) {
+            let start = first.start;
+            self.warn(node, &format!("its width begins at sOffset {start} m; what it is there holds before, too"));
+        }
+        if let Some(width) = widths.iter().find(|width| !bordered && width.factors[0] < 0.0) {
+            let (start, width) = (width.start, width.factors[0]);
+            self.warn(node, &format!("its width at sOffset {start} m is {width} m; it counts as 0"));
+        }
         if let Some(wide) = widths.iter().find(|width| !bordered && WIDEST < width.factors[0].abs()) {
             let value = format!("{} m", wide.factors[0]);
             return Err(self.invalid(node, "width", &value, format!("must be at most {WIDEST} m")));
@@ -121,7 +129,10 @@ impl Source<'_, '_> {
             *self.records.unknown_types.entry(name.to_owned()).or_default() += 1;
             Kind::Nothing
         });
-        let kind = if kind == Kind::Solid && is_for_trucks(node) { Kind::Apron } else { kind };
+        let kind = if kind == Kind::Solid && has_for_trucks(node, "allow") { Kind::Apron } else { kind };
+        if kind == Kind::Lane && has_for_trucks(node, "deny") {
+            self.warn(node, "forbids trucks; it is driven on as other lanes are");
+        }
         Ok(Lane {
             id,
             kind,
