@@ -9,7 +9,7 @@ use super::bake::ENTRY;
 use super::decide::MOST_CARS;
 use super::hcm::Lane;
 use super::network::{Kind, Network};
-use super::units::{BEYOND, FINER_SPEED, length, speed};
+use super::units::{BEYOND, FINER_SPEED, length, metres, speed};
 use super::{Car, Demand, Error, Mix, Rules, Run, STEP};
 use crate::layout::Stream;
 
@@ -22,6 +22,8 @@ const UP_TO_SPEED: i32 = length(20.0);
 /// More come than a lane can serve where this part of them stays away: a lane that just can loses less, since up to 15
 /// wait outside.
 const LOST_OVER_CAPACITY: f64 = 0.03;
+/// Paths that pass an entry nearer to each other than this are of one ring lane (m).
+const ONE_LANE: f32 = 1.5;
 /// A car on its arm below this speed is queued.
 const QUEUED: i32 = speed(2.0);
 
@@ -138,13 +140,21 @@ impl<'a> Survey<'a> {
     pub fn lane(&self, source: usize) -> Lane {
         let own = &self.network.sources[source];
         let entry_lanes = self.network.sources.iter().filter(|other| other.entry == own.entry).count();
-        let mut passing: Vec<u32> = (0..self.network.paths.len())
-            .filter(|&path| self.passes[path * self.network.n_arms + own.entry as usize] < BEYOND)
-            .map(|path| self.network.source_of(path).lane)
-            .collect();
-        passing.sort_unstable();
-        passing.dedup();
-        Lane { entry_lanes, ring_lanes: passing.len(), lane: own.lane as usize }
+        let at = |path: usize| self.passes[path * self.network.n_arms + own.entry as usize];
+        let passing: Vec<usize> = (0..self.network.paths.len()).filter(|&path| at(path) < BEYOND).collect();
+        let mut lanes: Vec<u32> = passing.iter().map(|&path| self.network.source_of(path).lane).collect();
+        lanes.sort_unstable();
+        lanes.dedup();
+        // Lanes of an arm may lead into one of the ring.
+        let mut radii: Vec<f32> =
+            passing.iter().map(|&path| self.network.position(path, metres(at(path))).length()).collect();
+        radii.sort_by(f32::total_cmp);
+        radii.dedup_by(|after, before| {
+            let is_beside = *after - *before < ONE_LANE;
+            *before = *after;
+            is_beside
+        });
+        Lane { entry_lanes, ring_lanes: lanes.len().min(radii.len()), lane: own.lane as usize }
     }
 
     /// Counts at every entry lane over so many steps after a warm-up; at sources that are `full` as many cars wait
