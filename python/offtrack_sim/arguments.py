@@ -8,10 +8,11 @@ import operator
 import os
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 import numpy.typing as npt
+from gymnasium.vector import AutoresetMode
 
 #: Most names of routes that a batch takes: more than any benchmark has routes.
 MOST_NAMES = 10_000_000
@@ -19,9 +20,13 @@ MOST_NAMES = 10_000_000
 MOST_VALUES = 1000
 
 
-def mode_name(mode: str | enum.Enum) -> str:
+def mode_name(name: str, mode: str | enum.Enum) -> str:
     """``"next_step"`` for ``AutoresetMode.NEXT_STEP`` or its name, and so on."""
-    return (mode.name if isinstance(mode, enum.Enum) else text("autoreset", mode)).lower()
+    given = mode.name if isinstance(mode, enum.Enum) else text(name, mode)
+    known = [mode.name.lower() for mode in AutoresetMode]
+    if given.lower() not in known:
+        raise ValueError(f'{name}: "{given}"; must be one of {", ".join(known)}')
+    return given.lower()
 
 
 def checked_seed(seed: int) -> int:
@@ -120,11 +125,16 @@ def numbers(name: str, value: npt.ArrayLike, needed: str) -> npt.NDArray[Any]:
     return found
 
 
+def is_sequence(given: object) -> TypeGuard[Sequence[Any]]:
+    """Whether things stand in an order, one for each truck: not a text, a set or a dict."""
+    return isinstance(given, Sequence | np.ndarray) and not isinstance(given, str) and getattr(given, "ndim", 1) > 0
+
+
 def check_length(name: str, given: Sequence[Any] | None, n: int) -> None:
     """An error unless there is one for each truck; before any of them is looked at."""
     if given is None:
         return
-    if isinstance(given, str) or not hasattr(given, "__len__"):
+    if not is_sequence(given):
         raise TypeError(f"{name}: {given!r}; a sequence is needed, one a truck")
     if len(given) != n:
         raise ValueError(f"{name}: {len(given)} of them; {n} are needed, one a truck")

@@ -117,7 +117,7 @@ class Batch(_offtrack.Batch):
             split=text("split", split),
             routes=names,
             seed=checked_seed(seed),
-            autoreset=mode_name(autoreset),
+            autoreset=mode_name("autoreset", autoreset),
             num_threads=threads,
             device=device_name(device),
             max_episode_steps=limit,
@@ -248,7 +248,7 @@ class Batch(_offtrack.Batch):
         seeds: Sequence[int | None] | None = None,
         streams: Sequence[tuple[int, int] | None] | None = None,
         routes: Sequence[str | None] | None = None,
-        starts: Sequence[Start | tuple[float, float] | None] | None = None,
+        starts: Sequence[Start | tuple[float, ...] | None] | None = None,
     ) -> None:
         """Begins an episode of some trucks and leaves the others as they are.
 
@@ -346,12 +346,12 @@ class Batch(_offtrack.Batch):
             raise TypeError(f"starts[{index}]: {given!r}; {needed}") from None
         return offset, heading, speed, self._vehicle(f"starts[{index}].vehicle", start.vehicle), along
 
-    def _vehicle(self, name: str, given: int | tuple[str, str]) -> int:
+    def _vehicle(self, name: str, given: int | Sequence[str]) -> int:
         """Index of a vehicle, which may be given as a class."""
         rows = self._rows
-        if not isinstance(given, tuple):
+        if not isinstance(given, tuple | list):
             return within(name, given, 0, len(rows))
-        found = [index for index, known in enumerate(self.classes) if known == given and (rows == index).any()]
+        found = [index for index, known in enumerate(self.classes) if known == tuple(given) and (rows == index).any()]
         if not found:
             known = ", ".join(str(self.classes[index]) for index in np.unique(rows))
             raise ValueError(f"{name}: {given!r}; {self.scenario} has {known}")
@@ -369,8 +369,9 @@ class Batch(_offtrack.Batch):
         return {name: row.view(COLUMNS[name].base).reshape(-1, *COLUMNS[name].shape) for name, row in zip(wanted, rows)}
 
     def state(self) -> dict[str, Array]:
-        """Everything that :meth:`restore` needs: all columns, and ``"stream"``, uint32 ``[num_envs, 2]``."""
-        return {**self.columns(), "stream": np.array(self.streams(), dtype=np.uint32).reshape(self.num_envs, 2)}
+        """What :meth:`restore` needs: all columns, ``"stream"`` ``[num_envs, 2]`` and ``"world"`` ``[]``, uint32."""
+        stream = np.array(self.streams(), dtype=np.uint32).reshape(self.num_envs, 2)
+        return {**self.columns(), "stream": stream, "world": np.array(self.fingerprint(), dtype=np.uint32)}
 
     def restore(self, state: Mapping[str, Array]) -> None:
         """Goes on from a state: with the same scenario and routes every later step is the same, bit for bit.
@@ -381,7 +382,7 @@ class Batch(_offtrack.Batch):
                 column, truck and field: a steer angle beyond the lock, a number that is not finite, a truck that waits
                 where ``autoreset`` is ``"same_step"``. The batch is left as it was.
         """
-        columns, streams = checked_state(state, self.num_envs)
+        columns, streams = checked_state(state, self.num_envs, self.scenario, self.fingerprint())
         self.restore_bytes(columns, streams)
 
     def render(self, env: int = 0, size: int = 480) -> npt.NDArray[np.uint8]:

@@ -20,7 +20,7 @@ class Road(NamedTuple):
     lanes: list[Doubles]
     """Centre lines of all lanes of the road, ``[m, 2]`` each [m]."""
     kerbs: list[Doubles]
-    """Edges of what may be driven on, closed lines ``[m, 2]`` with the road on their left [m]."""
+    """Edges of what may be driven on, lines ``[m, 2]`` that end where they begin, with the road on their left [m]."""
 
     def edges(self) -> tuple[Doubles, Doubles]:
         """Left and right edge of the route's lane beside each waypoint, ``[n, 2]`` each [m]."""

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _offtrack
-from .arguments import checked_integer, names_of, numbers, text, within
+from .arguments import checked_integer, is_sequence, names_of, numbers, text, within
 from .scenarios import Scenario, given, kept
+from .state import check_world
 
 Floats = npt.NDArray[np.float32]
 Doubles = npt.NDArray[np.float64]
@@ -86,6 +87,8 @@ class Observer(_offtrack.Observer):
         *,
         num_threads: int | None = None,
     ) -> Observer:
+        if isinstance(routes, Set | Mapping):
+            raise TypeError(f"routes: {routes!r}; a sequence is needed, one a truck or one for all")
         names = names_of(routes)
         threads = 0 if num_threads is None else within("num_threads", num_threads, 1, 1025)
         pairs, rows = _vehicles(vehicles)
@@ -116,10 +119,12 @@ class Observer(_offtrack.Observer):
     def __getnewargs_ex__(self) -> tuple[tuple[()], dict[str, Any]]:
         return (), self._arguments
 
-    def __getstate__(self) -> list[tuple[int, int | None, int, float]]:
-        return self.states()
+    def __getstate__(self) -> tuple[int, list[tuple[int, int | None, int, float]]]:
+        return self.fingerprint(), self.states()
 
-    def __setstate__(self, states: list[tuple[int, int | None, int, float]]) -> None:
+    def __setstate__(self, kept: tuple[int, list[tuple[int, int | None, int, float]]]) -> None:
+        world, states = kept
+        check_world(self.scenario, world, self.fingerprint())
         self.restore_states(states)
 
     def begin(
@@ -220,11 +225,11 @@ class Observer(_offtrack.Observer):
             ValueError: For another shape, for an action outside the table, a number outside -1..1, and a speed that is
                 not finite.
         """
-        speeds = _numbers("target_speed", target_speed, (self.num_trucks,))
+        speeds = _numbers("target_speed", target_speed, (self.num_trucks,)).astype(np.float32)
         if not np.isfinite(speeds).all():
             truck = int(np.flatnonzero(~np.isfinite(speeds))[0])
             raise ValueError(f"target_speed[{truck}]: {speeds[truck]}; a finite number is needed")
-        return self.commands(actions, speeds.astype(np.float32))
+        return self.commands(actions, speeds)
 
     def frame(self, route: str) -> Frame:
         """Where the road of a route lies in its map."""
@@ -235,7 +240,10 @@ class Observer(_offtrack.Observer):
         return self.waypoints_of(text("route", route))
 
     def kerbs(self, route: str) -> list[Doubles]:
-        """The kerbs of a route's road in the map's frame: closed lines ``[n, 2]`` [m], drivable on their left."""
+        """The kerbs of a route's road in the map's frame: lines ``[n, 2]`` [m], drivable on their left.
+
+        The last point of each is joined to its first.
+        """
         return self.kerbs_of(text("route", route))
 
     def dimensions(self, vehicle: tuple[str, str] | int | None = None) -> dict[str, float]:
@@ -251,7 +259,7 @@ class Observer(_offtrack.Observer):
         """Indices of trucks, none for all."""
         if trucks is None:
             return None
-        if isinstance(trucks, str) or not hasattr(trucks, "__len__"):
+        if not is_sequence(trucks):
             raise TypeError(f"trucks: {trucks!r}; indices of trucks are needed, or None for all")
         rows = [within(f"trucks[{row}]", truck, 0, self.num_trucks) for row, truck in enumerate(trucks)]
         if len(set(rows)) != len(rows):
@@ -305,7 +313,7 @@ def _vehicles(given: Sequence[tuple[str, str]] | Sequence[int] | None) -> tuple[
     """Vehicles as pairs of names, or as indices; the other is None."""
     if given is None:
         return None, None
-    if isinstance(given, str) or not hasattr(given, "__len__"):
+    if not is_sequence(given):
         raise TypeError(f"vehicles: {given!r}; a sequence is needed, one a truck or one for all")
     if len(given) == 0:
         raise ValueError("vehicles: empty; give None for the first vehicle")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import gymnasium
@@ -15,7 +15,7 @@ try:
 except ImportError:
     raise ImportError("parallel: pettingzoo is needed; pip install offtrack-sim[pettingzoo]") from None
 
-from .arguments import check_commands, checked_seed, names_of, within
+from .arguments import check_commands, checked_seed, within
 from .batch import Batch
 from .layout import Ended
 from .scenarios import Scenario, whole
@@ -111,8 +111,7 @@ class RoundaboutParallel(ParallelEnv[str, Observation, Any]):
         if seed is None and not self._has_begun:
             seed = int(np.random.SeedSequence().generate_state(1)[0])
         streams = None if seed is None else [(checked_seed(seed), index) for index in range(n)]
-        stated = (options or {}).get("routes")
-        self.batch.begin(streams=streams, routes=None if stated is None else names_of(stated))
+        self.batch.begin(streams=streams, routes=(options or {}).get("routes"))
         self._has_begun = True
         self.agents = list(self.possible_agents)
         observation = self.batch.observation()
@@ -135,6 +134,8 @@ class RoundaboutParallel(ParallelEnv[str, Observation, Any]):
         """
         if not self.agents:
             raise gymnasium.error.ResetNeeded("call reset() before the first step and once no agents are left")
+        if not isinstance(actions, Mapping):
+            raise TypeError(f"actions: {actions!r}; a dict of an action for each agent is needed")
         missing = [agent for agent in self.agents if agent not in actions]
         if missing:
             raise KeyError(f"actions: {missing[0]} is missing; an action of each of {', '.join(self.agents)} is needed")

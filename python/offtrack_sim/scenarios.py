@@ -74,7 +74,8 @@ class Benchmark:
 
         Args:
             changes: A value for each key. A key is written with dots, and with an index where it is one of several
-                tables: ``"roundabout[0].train"``. A table that is not there is made; None removes a key.
+                tables: ``"roundabout[0].train"``, counted before any is removed. A table that is not there is made;
+                None removes a key.
             name: Name of the other benchmark.
 
         Raises:
@@ -86,7 +87,7 @@ class Benchmark:
         keys = self.keys
         for key, value in changes.items():
             _change(keys, text("key", key), value)
-        return Benchmark(keys, name, folder=self.folder)
+        return Benchmark(_without_removed(keys), name, folder=self.folder)
 
     def write(self, file: str | os.PathLike[str]) -> None:
         """Writes its text, for the command line; the files that it names are looked for beside it."""
@@ -103,6 +104,9 @@ class Benchmark:
     def __repr__(self) -> str:
         return f"Benchmark({self.name!r})"
 
+
+#: Stands where an entry of a list was.
+_REMOVED = object()
 
 #: A benchmark's name, the path of its file, a benchmark in memory, or its keys.
 Scenario = str | os.PathLike[str] | Benchmark | Mapping[str, Any]
@@ -166,7 +170,8 @@ def _source(scenario: str | os.PathLike[str]) -> str:
 
 
 def _is_file(source: str) -> bool:
-    return source.endswith(".toml") or os.path.isfile(source)
+    is_named = source in _offtrack.scenario_names()
+    return not is_named and (source.endswith(".toml") or os.path.isfile(source))
 
 
 def _plain(key: str, value: Any) -> Any:
@@ -186,6 +191,15 @@ def _plain(key: str, value: Any) -> Any:
         raise TypeError(f"{key}: {value!r}; a number, a text, a list or a table is needed")
     if isinstance(value, float) and not math.isfinite(value):
         raise ValueError(f"{key}: {value}; must be finite")
+    return value
+
+
+def _without_removed(value: Any) -> Any:
+    """A value without the entries of lists that were removed."""
+    if isinstance(value, dict):
+        return {name: _without_removed(inner) for name, inner in value.items()}
+    if isinstance(value, list):
+        return [_without_removed(inner) for inner in value if inner is not _REMOVED]
     return value
 
 
@@ -214,7 +228,8 @@ def _change(keys: dict[str, Any], key: str, value: Any) -> None:
     elif isinstance(last, int) and isinstance(place, list) and last < len(place) and value is not None:
         place[last] = copy.deepcopy(value)
     elif isinstance(last, int) and isinstance(place, list) and last < len(place):
-        del place[last]
+        # Indices of the changes that follow are those of the tables as they were.
+        place[last] = _REMOVED
     else:
         raise KeyError(f"{key}: there is no such table")
 

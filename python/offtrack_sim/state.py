@@ -11,18 +11,24 @@ import numpy.typing as npt
 from .layout import COLUMNS
 
 
+def check_world(scenario: str, found: npt.ArrayLike, fingerprint: int) -> None:
+    """An error where a state is of another world than this one of a benchmark."""
+    if np.asarray(found).tolist() != fingerprint:
+        raise ValueError(f"scenario: {scenario} has changed since this state was kept, or is another one here")
+
+
 def checked_state(
-    state: Mapping[str, npt.NDArray[Any]], num_envs: int
+    state: Mapping[str, npt.NDArray[Any]], num_envs: int, scenario: str, fingerprint: int
 ) -> tuple[list[tuple[str, npt.NDArray[np.uint8]]], list[tuple[int, int]]]:
     """The bytes of each column and the stream of each truck, if they are what ``Batch.state()`` gives of so many
-    trucks."""
+    trucks in this world of a benchmark."""
     if not isinstance(state, Mapping):
         raise TypeError(f"state: {type(state).__name__}; what Batch.state() gives is needed")
-    missing = [name for name in (*COLUMNS, "stream") if name not in state]
+    needed = [*COLUMNS, "stream", "world"]
+    missing = [name for name in needed if name not in state]
     if missing:
-        raise ValueError(
-            f"state: {missing[0]} is missing; Batch.state() gives all of {', '.join([*COLUMNS, 'stream'])}"
-        )
+        raise ValueError(f"state: {missing[0]} is missing; Batch.state() gives all of {', '.join(needed)}")
+    check_world(scenario, state["world"], fingerprint)
     columns = []
     for name, dtype in COLUMNS.items():
         column = np.asarray(state[name])

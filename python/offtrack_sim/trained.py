@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from .arguments import numbers
 from .episodes import Floats
 from .network import Layer, Network
 
@@ -236,8 +237,9 @@ def _normalisation_of(model: Any) -> tuple[Floats, Floats] | None:
 def _array(tensor: Any) -> Floats:
     """A tensor of any device, or an array."""
     if hasattr(tensor, "detach"):
-        tensor = tensor.detach().cpu().float().numpy()
-    return np.asarray(tensor, np.float32)
+        tensor = tensor.detach().cpu()
+        tensor = (tensor.float() if tensor.is_floating_point() else tensor).numpy()
+    return _numbers("layers", tensor).astype(np.float32)
 
 
 def _vector(name: str, values: npt.ArrayLike) -> Floats:
@@ -248,10 +250,7 @@ def _vector(name: str, values: npt.ArrayLike) -> Floats:
 
 
 def _numbers(name: str, values: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    try:
-        return np.asarray(values, np.float64)
-    except (TypeError, ValueError):
-        raise TypeError(f"{name}: {_kind(values)}; numbers are needed") from None
+    return numbers(name, values, "numbers are needed").astype(np.float64)
 
 
 def _is(name: str, thing: Any) -> bool:

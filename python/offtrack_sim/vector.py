@@ -10,7 +10,7 @@ import gymnasium
 import numpy as np
 import numpy.typing as npt
 
-from .arguments import checked_seed, mode_name
+from .arguments import checked_seed, is_sequence, mode_name
 from .batch import Batch
 from .scenarios import Scenario
 from .single import action_space, check_render_mode, checked_options, frames_per_second, observation_space
@@ -77,7 +77,7 @@ class RoundaboutVector(Base):
             )
             raise ImportError(message)
         check_render_mode(render_mode)
-        mode = "next_step" if autoreset_mode is None else mode_name(autoreset_mode)
+        mode = "next_step" if autoreset_mode is None else mode_name("autoreset_mode", autoreset_mode)
         if seed is None:
             seed = int(np.random.SeedSequence().generate_state(1)[0])
         self.batch = Batch(
@@ -114,7 +114,7 @@ class RoundaboutVector(Base):
     def reset(
         self,
         *,
-        seed: int | Sequence[int | None] | None = None,
+        seed: int | Sequence[int | None] | npt.NDArray[np.integer[Any]] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[npt.NDArray[np.float32], dict[str, Any]]:
         """Begins an episode of every truck.
@@ -133,19 +133,19 @@ class RoundaboutVector(Base):
         options = checked_options(options, "reset_mask", "routes", "starts")
         mask = options.get("reset_mask")
         envs = list(range(self.num_envs)) if mask is None else _masked(mask, self.num_envs)
+        # What goes on where no seed is given; before the first reset there is no episode to follow.
+        own = [None if self._has_begun else (self._seed, env) for env in range(self.num_envs)]
         streams: list[tuple[int, int] | None]
         if seed is None:
-            streams = [None if self._has_begun else (self._seed, env) for env in envs]
-        elif not isinstance(seed, Sequence | np.ndarray) or getattr(seed, "ndim", 1) == 0:
+            streams = [own[env] for env in envs]
+        elif not is_sequence(seed):
             whole = checked_seed(seed)  # type: ignore[arg-type]
             super().reset(seed=whole)
             streams = [(whole, env) for env in envs]
         else:
-            if isinstance(seed, str):
-                raise TypeError(f"seed: {seed!r}; an integer is needed, or one a truck")
             if len(seed) != self.num_envs:
                 raise ValueError(f"seed: {len(seed)} seeds for {self.num_envs} trucks; one each is needed")
-            streams = [None if (given := seed[env]) is None else (checked_seed(given), 0) for env in envs]
+            streams = [own[env] if (given := seed[env]) is None else (checked_seed(given), 0) for env in envs]
         self.batch.begin(
             envs,
             streams=streams,
@@ -299,9 +299,8 @@ def _chosen(name: str, values: Sequence[Any] | None, envs: list[int], num_envs: 
     """The values of these trucks."""
     if values is None:
         return None
-    if not isinstance(values, Sequence | np.ndarray) or getattr(values, "ndim", 1) == 0:
+    if not is_sequence(values):
         raise TypeError(f"options[{name!r}]: {values!r}; a sequence is needed, one a truck")
-    if isinstance(values, str) or len(values) != num_envs:
-        n = 1 if isinstance(values, str) else len(values)
-        raise ValueError(f"options[{name!r}]: {n} of them; {num_envs} are needed, one a truck")
+    if len(values) != num_envs:
+        raise ValueError(f"options[{name!r}]: {len(values)} of them; {num_envs} are needed, one a truck")
     return [values[env] for env in envs]

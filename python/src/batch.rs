@@ -326,14 +326,19 @@ impl Batch {
         guarded(|| self.restore(py, &columns, &streams))
     }
 
-    /// What `resume` needs beside the columns: a fingerprint of the world, and the sums of the tally.
-    fn progress(&self) -> PyResult<(u32, Vec<i64>)> {
-        guarded(|| Ok((self.place.world.fingerprint(), self.state()?.tally()?.sums.to_vec())))
+    /// A number for all that trucks drive by in this world.
+    fn fingerprint(&self) -> PyResult<u32> {
+        guarded(|| Ok(self.place.fingerprint()))
+    }
+
+    /// What `resume` needs beside the columns: the sums of the tally.
+    fn progress(&self) -> PyResult<Vec<i64>> {
+        guarded(|| Ok(self.state()?.tally()?.sums.to_vec()))
     }
 
     /// Takes what another batch's `progress` and `last_ended` gave.
-    fn resume(&self, progress: (u32, Vec<i64>), ends: Option<GivenEnds>) -> PyResult<()> {
-        guarded(|| self.take_up(progress, ends))
+    fn resume(&self, progress: Vec<i64>, ends: Option<GivenEnds>) -> PyResult<()> {
+        guarded(|| self.take_up(&progress, ends))
     }
 
     /// Seed and index that each truck draws from.
@@ -356,7 +361,7 @@ impl Batch {
     /// A route's waypoints `[n, 3]`, the lane's width at each `[n]`, and as lines `[m, 2]` the centres of all lanes of
     /// its road and the kerbs: in the frame of the batch's columns.
     fn geometry_of<'py>(&self, py: Python<'py>, route: &str) -> PyResult<geometry::Lines<'py>> {
-        guarded(|| geometry::lines(py, &self.place, self.route(route)?))
+        guarded(|| geometry::lines(py, &self.place, self.route("route", route)?))
     }
 
     /// Distance of points from the nearest kerb of a route's road, negative off the road, `[n]`.
@@ -366,7 +371,7 @@ impl Batch {
         route: &str,
         points: PyReadonlyArray2<f64>,
     ) -> PyResult<Bound<'py, PyArray1<f32>>> {
-        guarded(|| Ok(geometry::kerb_distances(py, &self.place, self.route(route)?, &points)))
+        guarded(|| Ok(geometry::kerb_distances(py, &self.place, self.route("route", route)?, &points)))
     }
 
     /// Lengths and limits of a vehicle by its index.

@@ -70,7 +70,7 @@ impl Observer {
                     (None, Some(rows)) => rows[truck],
                     (None, None) => 0,
                 };
-                let made = observer::Observer::new(place.world.clone(), route_of(&place, name)?, vehicle);
+                let made = observer::Observer::new(place.world.clone(), route_of(&place, "routes", name)?, vehicle);
                 made.map_err(|error| errors::of_simulator(&error))
             };
             let observers = routes.iter().enumerate().map(observer).collect::<PyResult<Vec<_>>>()?;
@@ -194,14 +194,14 @@ impl Observer {
 
     /// Origin in the map's frame, and whether the road is driven as its mirror image.
     fn frame_of(&self, route: &str) -> PyResult<((f64, f64), bool)> {
-        let frame = self.place.world.frame(route_of(&self.place, route)?);
+        let frame = self.place.world.frame(route_of(&self.place, "route", route)?);
         Ok(((frame.origin.x, frame.origin.y), frame.mirrored))
     }
 
     /// Position and heading of a route's waypoints in the map's frame, `[n, 3]`.
     fn waypoints_of<'py>(&self, py: Python<'py>, route: &str) -> PyResult<Points<'py>> {
         guarded(|| {
-            let observer = observer::Observer::new(self.place.world.clone(), route_of(&self.place, route)?, 0)
+            let observer = observer::Observer::new(self.place.world.clone(), route_of(&self.place, "route", route)?, 0)
                 .map_err(|error| errors::of_simulator(&error))?;
             let rows: Vec<f64> = observer.waypoints().flat_map(|(p, heading)| [p.x, p.y, heading]).collect();
             let n = rows.len() / 3;
@@ -212,7 +212,7 @@ impl Observer {
     /// The kerbs around a route in the map's frame, closed lines `[n, 2]`.
     fn kerbs_of<'py>(&self, py: Python<'py>, route: &str) -> PyResult<Vec<Points<'py>>> {
         guarded(|| {
-            let roundabout = self.place.world.routes[route_of(&self.place, route)? as usize].roundabout;
+            let roundabout = self.place.world.routes[route_of(&self.place, "route", route)? as usize].roundabout;
             let scenario = &self.place.scenario;
             let lines = scenario.places[roundabout as usize].roundabout.kerb_lines(scenario.gutter);
             let rows = lines.iter().map(|line| line.iter().flat_map(|p| [p.x, p.y]).collect::<Vec<f64>>());
@@ -223,6 +223,11 @@ impl Observer {
     /// Lengths and limits of a truck by name.
     fn dimensions_of<'py>(&self, py: Python<'py>, truck: usize) -> PyResult<Bound<'py, PyDict>> {
         guarded(|| geometry::dimensions(py, self.held()?.observers[truck].rig()))
+    }
+
+    /// A number for all that the observers' benchmark is, see `Batch`.
+    fn fingerprint(&self) -> PyResult<u32> {
+        guarded(|| Ok(self.place.fingerprint()))
     }
 
     /// How far each observer has come.
@@ -315,13 +320,13 @@ fn of_truck(truck: usize, error: Error) -> PyErr {
     errors::of_simulator(&error)
 }
 
-/// Index of a route by its name.
-fn route_of(place: &Place, name: &str) -> PyResult<u32> {
+/// Index of a route by its name, which stands in this argument.
+fn route_of(place: &Place, argument: &str, name: &str) -> PyResult<u32> {
     let names = &place.world.route_names;
     let found = names.iter().position(|known| known == name);
     found.map(|index| index as u32).ok_or_else(|| {
         let list = offtrack::files::reader::shortened(&names.join(", "), 600);
-        PyValueError::new_err(format!("routes: {name:?}; an observer follows one route a truck, here of {list}"))
+        PyValueError::new_err(format!("{argument}: {name:?}; an observer follows one route a truck, here of {list}"))
     })
 }
 

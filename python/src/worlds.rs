@@ -4,7 +4,7 @@ mod routes; // those that are to be driven
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, TryLockError};
 use std::time::Duration;
 
 use offtrack::files::cache::{Cache, Loading, Stopped};
@@ -37,6 +37,8 @@ pub struct Place {
     pub routes: Vec<u32>,
     /// Steps after which an episode is timed out in any case, where the caller says so.
     pub max_episode_steps: Option<u32>,
+    /// The world's fingerprint, once it was asked for.
+    fingerprint: Arc<OnceLock<u32>>,
 }
 
 /// A benchmark as Python gives it.
@@ -75,6 +77,11 @@ pub struct Asked<'a> {
 static BAKED: Mutex<Vec<Place>> = Mutex::new(Vec::new());
 
 impl Place {
+    /// A number for all that trucks drive by here.
+    pub fn fingerprint(&self) -> u32 {
+        *self.fingerprint.get_or_init(|| self.world.fingerprint())
+    }
+
     /// The place that is asked for: from those that were baked last, or baked now, unless `stop` is set on the way.
     pub fn find(asked: &Asked, stop: &AtomicBool) -> PyResult<Place> {
         Place::of(asked, stop, |scenario| scenario)
@@ -110,7 +117,8 @@ impl Place {
         }
         let routes = Split::ALL.iter().flat_map(|&split| scenario.split(split)).copied().collect();
         let (scenario, world) = (Arc::new(scenario), Arc::new(world));
-        let place = Place { scenario, world, split, routes, max_episode_steps: limit };
+        let fingerprint = Arc::default();
+        let place = Place { scenario, world, split, routes, max_episode_steps: limit, fingerprint };
         if baked.len() == KEPT {
             baked.remove(0);
         }

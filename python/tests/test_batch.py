@@ -137,6 +137,7 @@ def test_a_state_is_restored_bit_for_bit_with_its_streams() -> None:
             r"reward: float32 of shape \(3,\); float32 of shape \(12,\) is needed",
         ),
         ({name: column for name, column in state.items() if name != "stream"}, "state: stream is missing"),
+        (Batch(num_envs=12, split="test").state(), "scenario: attard2023 has changed since .* or is another one here"),
         ({**state, "action": np.full(12, 77, np.uint32)}, r"action\[0\]: 77; the world has actions 0..9"),
     ]:
         with pytest.raises(ValueError, match=message):

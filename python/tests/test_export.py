@@ -171,6 +171,13 @@ def test_what_a_network_reads_and_gives_is_refused_by_its_argument(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("weights", [np.full((69, 9), 1 + 2j), np.full((69, 9), "0.5"), np.full((69, 9), True)])
+def test_weights_that_are_no_real_numbers_are_refused(weights: Any, tmp_path: Path) -> None:
+    with pytest.raises(TypeError, match=r"layers\[0\]: .*; a pair of arrays, weights and biases, is needed"):
+        export.save(tmp_path / "policy.safetensors", [(weights, np.zeros(9))])
+    assert not list(tmp_path.iterdir())
+
+
 def test_statistics_are_of_each_frame_or_of_all_of_them(tmp_path: Path) -> None:
     model = [Linear(138, 9, 1)]
     for n in (69, 138):

@@ -174,8 +174,9 @@ def test_wrong_starts_are_refused_and_begin_nothing() -> None:
         (Start(along=cast(Any, "half")), TypeError, r"starts\[1\]: Start\(.*along='half'\); a tuple of offset"),
         (("left", 0.0), TypeError, r"starts\[1\]: \('left', 0.0\); a tuple of offset"),
         (0.5, TypeError, r"starts\[1\]: 0.5; a tuple of offset"),
-        (Start(speed=1.5), ValueError, r"starts\[1\]: 1.5 of the largest start error; must lie in -1..1"),
-        (Start(speed=float("nan")), ValueError, r"starts\[1\]: NaN of the largest start error"),
+        (Start(speed=1.5), ValueError, r"starts\[1\].speed: 1.5; must lie in -1..1, a fraction of"),
+        (Start(offset=-2.0), ValueError, r"starts\[1\].offset: -2; must lie in -1..1"),
+        (Start(speed=float("nan")), ValueError, r"starts\[1\].speed: NaN; must lie in -1..1"),
     ]
     for start, error, message in wrong:
         with pytest.raises(error, match=message):

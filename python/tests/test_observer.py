@@ -132,6 +132,14 @@ def test_a_copy_goes_on_from_where_the_original_is_and_leaves_it_alone(way: Any)
     assert observer.states() == before != copied.states()
 
 
+def test_a_pickle_of_a_benchmark_that_has_changed_since_is_refused(short_benchmark: str) -> None:
+    kept = pickle.dumps(Observer(short_benchmark, Batch(short_benchmark, 1).route_names[:1]))
+    file = Path(short_benchmark)
+    file.write_text(file.read_text().replace("time_limit = 1.0", "time_limit = 1.5"))
+    with pytest.raises(ValueError, match="scenario: short has changed since this state was kept"):
+        pickle.loads(kept)
+
+
 def test_some_trucks_may_begin_and_be_observed_while_others_stay_where_they_are() -> None:
     observer, place = on_lane(3)
     observer.begin(**place)
@@ -165,6 +173,8 @@ def test_what_no_truck_can_have_is_refused_by_its_name_and_changes_nothing() -> 
             observer.observe(**{**place, **changed})
     with pytest.raises(ValueError, match=r"^target\[1\]: NaN"):
         speed_control(observer, 8.0, [8.0, np.nan])
+    with pytest.raises(ValueError, match=r"^target_speed\[0\]: inf; a finite number is needed"):
+        observer.command(np.array([4, 0]), 1e39)
     with pytest.raises(ValueError, match=r"^actions\[0\]: 9; must lie in 0..9"):
         observer.command(np.array([9, 0]))
     assert observer.states() == before
@@ -182,6 +192,8 @@ def test_an_observer_of_unknown_routes_or_vehicles_is_refused_with_those_there_a
         (("laden2026", ["20m/E-left-2"], [99_999]), ValueError, "^vehicles: 99999"),
         (("laden2026", ["20m/E-left-2"], ["daf_xf"]), TypeError, r"^vehicles\[0\]: 'daf_xf'"),
         (("laden2026", ["20m/E-left-2"] * 3, [0, 1]), ValueError, "^vehicles: 2 of them; 3 or 1 are needed"),
+        (("attard2023", {"20m/E-left-2"}), TypeError, "^routes: .*; a sequence is needed"),
+        (("laden2026", ["20m/E-left-2"], {0}), TypeError, "^vehicles: .*; a sequence is needed"),
     ]:
         with pytest.raises(error, match=message):
             sim.Observer(*arguments)
@@ -190,3 +202,5 @@ def test_an_observer_of_unknown_routes_or_vehicles_is_refused_with_those_there_a
         Policy.shipped("laden2026").check(observer)
     with pytest.raises(ValueError, match="^vehicle: "):
         observer.dimensions(("a", "b"))
+    with pytest.raises(ValueError, match='^route: "nowhere"'):
+        observer.waypoints("nowhere")

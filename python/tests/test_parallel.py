@@ -110,6 +110,10 @@ def test_routes_are_stated_for_all_trucks() -> None:
         env.reset(options={"routes": ["20m/N-left-2", "20m/N-left-4"]})
     with pytest.raises(ValueError, match="routes"):
         env.reset(options={"routes": ["20m/N-left-2"]})
+    with pytest.raises(TypeError, match="routes: .*; a sequence is needed, one a truck"):
+        env.reset(options={"routes": set(stated)})
+    with pytest.raises(ValueError, match=r"starts.along: not where trucks share a road"):
+        env.batch.begin(starts=[offtrack_sim.Start(along=0.5)] * 2)
 
 
 @pytest.mark.parametrize(
@@ -135,6 +139,8 @@ def test_an_action_that_is_missing_or_none_is_named() -> None:
         env.step({"truck_0": 3, "truck_1": 0.5})
     with pytest.raises(ValueError, match="36"):
         env.step({"truck_0": 3, "truck_1": 36})
+    with pytest.raises(TypeError, match="actions: None; a dict of an action for each agent"):
+        env.step(None)  # type: ignore[arg-type]
 
 
 def test_a_batch_of_groups_is_of_whole_ones_and_no_evaluation_of_single_trucks() -> None:

@@ -65,6 +65,26 @@ def test_a_benchmark_in_memory_is_driven_as_its_file_and_with_changes_as_the_cha
     )
 
 
+def test_changes_of_one_dict_count_tables_as_they_are() -> None:
+    shipped = offtrack_sim.benchmark("attard2023")
+    files = [table["file"] for table in shipped.keys["roundabout"]]
+    changed = shipped.changed({"roundabout[0]": None, "roundabout[1].train": ["E-left-3"], "roundabout[4]": None})
+    tables = changed.keys["roundabout"]
+    assert [table["file"] for table in tables] == files[1:4]
+    assert [table.get("train") for table in tables[:2]] == [["E-left-3"], "all"]
+    with pytest.raises(KeyError, match="there is no such table"):
+        shipped.changed({"roundabout[0]": None, "roundabout[0].train": "all"})
+
+
+def test_a_shipped_name_is_that_benchmark_whatever_lies_in_the_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("attard2023").write_text("no benchmark")
+    assert offtrack_sim.benchmark("attard2023").folder is None
+    assert (stepped("attard2023") == stepped(offtrack_sim.benchmark("attard2023"))).all()
+
+
 def test_wherever_a_benchmarks_name_stands_one_in_memory_may_stand(tmp_path: Path) -> None:
     keys = offtrack_sim.benchmark("attard2023").keys
     keys["roundabout"] = [{"file": "16m", "train": ["N-left-3"], "test": ["E-left-2"]}]
@@ -171,7 +191,7 @@ def test_roads_kerbs_and_vehicles_are_there_as_arrays_that_fit_each_other() -> N
     for points in (np.zeros(2), np.full((1, 2), np.nan), np.zeros((2, 3))):
         with pytest.raises(ValueError, match="points: "):
             batch.kerb_distance("16m/N-left-3", points)
-    with pytest.raises(ValueError, match='routes: "20m/N-left-4"; the batch drives'):
+    with pytest.raises(ValueError, match='route: "20m/N-left-4"; the batch drives'):
         batch.road("20m/N-left-4")
 
 

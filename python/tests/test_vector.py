@@ -124,6 +124,9 @@ def test_an_int_seed_is_the_batch_of_that_seed_and_none_goes_on() -> None:
     assert (second == batch.observation()).all() and (second != first).any()
     seeded, _ = env.reset(seed=[None, 11, None, None, None])
     assert (seeded[1] == offtrack_sim.Roundabout().reset(seed=11)[0]).all()
+    # Before the first reset there is nothing to go on from: a truck without a seed begins with its first episode.
+    begun, _ = offtrack_sim.make_vec(num_envs=5, seed=11).reset(seed=[None, 11, None, None, None])
+    assert (begun[[0, 2, 3, 4]] == first[[0, 2, 3, 4]]).all() and (begun[1] == seeded[1]).all()
 
 
 def test_without_a_seed_two_environments_differ_and_with_one_they_do_not() -> None:
@@ -189,7 +192,12 @@ def test_who_writes_into_a_mask_of_infos_changes_no_other(mode: str, short_bench
 
 def test_seeds_and_starts_are_sequences() -> None:
     env = offtrack_sim.make_vec("attard2023", 2)
-    first = env.reset(seed=np.array(7))[0]  # type: ignore[arg-type]
+    first = env.reset(seed=np.array(7))[0]
     assert (first == env.reset(seed=7)[0]).all()
-    with pytest.raises(TypeError, match="starts"):
-        env.reset(options={"starts": {"a": None, "b": None}})
+    for given in ({"a": None, "b": None}, {None}, "ab"):
+        with pytest.raises(TypeError, match="starts.*; a sequence is needed, one a truck"):
+            env.reset(options={"starts": given})
+        with pytest.raises(TypeError, match="^starts: .*; a sequence is needed, one a truck"):
+            env.batch.begin(starts=given)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match='^autoreset_mode: "NEVER"; must be one of next_step, same_step, disabled'):
+        offtrack_sim.make_vec("attard2023", 2, autoreset_mode="NEVER")

@@ -34,7 +34,7 @@ pub enum Error {
     },
     /// Trucks of a group begin together.
     #[error(
-        "trucks: the group of truck {env} is not begun as a whole; all {group} begin together, each or none on a \
+        "envs: the group of truck {env} is not begun as a whole; all {group} begin together, each or none on a \
              stated route, each or none in a stream of its own"
     )]
     PartOfGroup {
@@ -44,7 +44,7 @@ pub enum Error {
         group: usize,
     },
     /// What is done to trucks one by one.
-    #[error("{what}: not where trucks share a road (traffic.group is {group}); leave the key out")]
+    #[error("{what}: not where trucks share a road (traffic.group is {group}); leave it out")]
     NotInGroups {
         /// What was asked for.
         what: &'static str,
@@ -119,10 +119,12 @@ pub enum Error {
         n_envs: usize,
     },
     /// A start beyond the benchmark's largest errors.
-    #[error("starts[{env}]: {fraction} of the largest start error; must lie in -1..1")]
+    #[error("starts[{env}].{part}: {fraction}; must lie in -1..1, a fraction of the largest error or range")]
     UnknownStart {
         /// Index of its truck.
         env: usize,
+        /// Which part of it: `offset`, `heading` or `speed`.
+        part: &'static str,
         /// The fraction of the largest error.
         fraction: String,
     },

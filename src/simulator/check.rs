@@ -99,13 +99,16 @@ pub(super) fn check_start(world: &World, env: usize, start: &Start) -> Result<()
     if n_vehicles <= start.vehicle as usize {
         return Err(Error::UnknownVehicle { vehicle: start.vehicle, n_vehicles });
     }
-    let outside =
-        [start.offset, start.heading, start.speed].into_iter().find(|fraction| !(-1.0..=1.0).contains(fraction));
-    if let Some(fraction) = outside {
-        return Err(Error::UnknownStart { env, fraction: fraction.to_string() });
+    let parts = [("offset", start.offset), ("heading", start.heading), ("speed", start.speed)];
+    if let Some((part, fraction)) = parts.into_iter().find(|(_, fraction)| !(-1.0..=1.0).contains(fraction)) {
+        return Err(Error::UnknownStart { env, part, fraction: fraction.to_string() });
     }
     if !(0.0..=1.0).contains(&start.along) {
         return Err(Error::BeyondRoute { env, fraction: start.along.to_string() });
+    }
+    if start.along != 0.0 {
+        // Trucks of a group would stand in each other.
+        check_alone(world, "starts.along")?;
     }
     Ok(())
 }

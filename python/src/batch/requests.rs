@@ -40,7 +40,7 @@ impl Batch {
             Ok(Begin {
                 env,
                 stream: streams.and_then(|streams| streams[index]).map(|(seed, env)| Stream { seed, env }),
-                route: route.map(|name| self.route(name)).transpose()?,
+                route: route.map(|name| self.route("routes", name)).transpose()?,
                 start: starts.and_then(|starts| starts[index]).map(start),
             })
         };
@@ -52,13 +52,13 @@ impl Batch {
         state.look()
     }
 
-    /// Index of a route by its name.
-    pub(super) fn route(&self, name: &str) -> PyResult<u32> {
+    /// Index of a route by its name, which stands in this argument.
+    pub(super) fn route(&self, argument: &str, name: &str) -> PyResult<u32> {
         let names = &self.place.world.route_names;
         let found = names.iter().position(|known| known == name);
         found.map(|index| index as u32).ok_or_else(|| {
             let list = offtrack::files::reader::shortened(&names.join(", "), 600);
-            PyValueError::new_err(format!("routes: {name:?}; the batch drives {list}"))
+            PyValueError::new_err(format!("{argument}: {name:?}; the batch drives {list}"))
         })
     }
 }

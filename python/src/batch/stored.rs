@@ -54,16 +54,9 @@ impl Batch {
         state.look()
     }
 
-    /// Counts on from the sums of another batch's tally, and tells the episodes that its last step ended. An error
-    /// where
-    /// that batch drove in another world.
-    pub(super) fn take_up(&self, (fingerprint, sums): (u32, Vec<i64>), ends: Option<GivenEnds>) -> PyResult<()> {
-        if fingerprint != self.place.world.fingerprint() {
-            let name = &self.place.scenario.name;
-            return Err(PyValueError::new_err(format!(
-                "scenario: {name} has changed since this state was kept, or is another one here"
-            )));
-        }
+    /// Counts on from the sums of another batch's tally in the same world, and tells the episodes that its last step
+    /// ended.
+    pub(super) fn take_up(&self, sums: &[i64], ends: Option<GivenEnds>) -> PyResult<()> {
         let mut state = self.state()?;
         let before = state.simulator.tally().map_err(|error| errors::of_simulator(&error))?;
         if sums.len() != before.sums.len() {
