@@ -1,5 +1,5 @@
-//! The policies that a run keeps on its way: from its first update on, whenever its env steps have grown by a factor of
-//! about 1.4.
+//! The policies that a run keeps on its way: from its first update on, and from the first validation on at validations
+//! alone, whenever its env steps have grown by a factor of about 1.4.
 //!
 //! So a large budget needs few of them. The first one is kept for ever, and of the others the latest, which begin at
 //! about a hundredth of the run.
