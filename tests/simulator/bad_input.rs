@@ -355,7 +355,7 @@ fn a_batch_that_cannot_be_is_refused_and_a_wrong_action_changes_nothing() {
         assert_eq!(refused(&[start(0.0)]).to_string(), "starts: 1 for 2 trucks; one each is needed");
         assert_eq!(
             refused(&[start(0.0), start(1.5)]).to_string(),
-            "starts[1]: 1.5 of the largest start error; must lie in -1..1"
+            "starts[1].offset: 1.5; must lie in -1..1, a fraction of the largest error or range"
         );
         assert_eq!(
             refused(&[start(f32::NAN), start(0.0)]).to_string(),

@@ -9,17 +9,16 @@ use crate::geometry::{Curve, Piece};
 use crate::map::Road;
 use crate::map::drawing::{Layers, parse};
 
-/// The first ways of the arms of a road, which share nothing, each as these entities beside all kerbs.
-fn with_ways(road: &Road, entities: impl Fn(&Curve) -> String) -> String {
+/// These ways of a road, each as these entities, beside all kerbs.
+fn with_ways(road: &Road, ways: &[&Curve], entities: impl Fn(&Curve) -> String) -> String {
     let kerbs = road.ground().faces.loops.iter().map(|curve| polyline("KERB", curve, true, 1.0));
-    // Of each arm's ways the first ones share their way in.
-    kerbs.chain(road.ground().lines.iter().step_by(5).map(|line| entities(&line.line))).collect()
+    kerbs.chain(ways.iter().map(|way| entities(way))).collect()
 }
 
-/// The same ways, joined of parts.
-fn assert_joined(road: &Road, entities: impl Fn(&Curve) -> String) {
-    let whole = read(&with_ways(road, |line| polyline("LANE", line, false, 1.0)), &layers()).unwrap();
-    let cut = read(&with_ways(road, entities), &layers()).unwrap();
+/// These ways, which share no end of a part, are the same when they are joined of parts.
+fn assert_joined(road: &Road, ways: &[&Curve], entities: impl Fn(&Curve) -> String) {
+    let whole = read(&with_ways(road, ways, |line| polyline("LANE", line, false, 1.0)), &layers()).unwrap();
+    let cut = read(&with_ways(road, ways, entities), &layers()).unwrap();
     assert_eq!((cut.ground.lines.len(), cut.ground.arms.len()), (whole.ground.lines.len(), whole.ground.arms.len()));
     assert!(cut.notes.iter().any(|note| note.contains("lines on layer LANE are joined to ")), "{:?}", cut.notes);
     for (one, other) in cut.ground.lines.iter().zip(&whole.ground.lines) {
@@ -29,7 +28,10 @@ fn assert_joined(road: &Road, entities: impl Fn(&Curve) -> String) {
 
 #[test]
 fn ways_in_parts_are_joined_where_one_ends_and_one_begins() {
-    assert_joined(&Road::named("20m").unwrap(), |curve| {
+    let road = Road::named("20m").unwrap();
+    // Of each arm's ways the first ones share their way in.
+    let ways: Vec<&Curve> = road.ground().lines.iter().step_by(5).map(|line| &line.line).collect();
+    assert_joined(&road, &ways, |curve| {
         let length = curve.length() / 3.0;
         // The last one first.
         let part = |k: usize| curve.part(length * k as f64, length * (k + 1) as f64);
@@ -41,8 +43,9 @@ fn ways_in_parts_are_joined_where_one_ends_and_one_begins() {
 fn an_arc_that_turns_right_is_joined_though_a_file_has_it_counter_clockwise() {
     let road = Road::named("20m").unwrap();
     let turns_right = |piece: &Piece| matches!(piece, Piece::Arc { sweep, .. } if *sweep < 0.0);
-    assert!(road.ground().lines.iter().step_by(5).all(|line| line.line.pieces.iter().any(turns_right)));
-    assert_joined(&road, |curve| {
+    let way = &road.ground().lines[0].line;
+    assert!(way.pieces.iter().any(turns_right));
+    assert_joined(&road, &[way], |curve| {
         let entity = |piece: &Piece| match *piece {
             Piece::Segment { from, to } => {
                 let (from, to) = (AT + from, AT + to);
