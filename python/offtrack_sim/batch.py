@@ -346,7 +346,7 @@ class Batch(_offtrack.Batch):
             raise TypeError(f"starts[{index}]: {given!r}; {needed}") from None
         return offset, heading, speed, self._vehicle(f"starts[{index}].vehicle", start.vehicle), along
 
-    def _vehicle(self, name: str, given: int | Sequence[str]) -> int:
+    def _vehicle(self, name: str, given: int | tuple[str, str] | list[str]) -> int:
         """Index of a vehicle, which may be given as a class."""
         rows = self._rows
         if not isinstance(given, tuple | list):

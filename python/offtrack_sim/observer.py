@@ -225,7 +225,9 @@ class Observer(_offtrack.Observer):
             ValueError: For another shape, for an action outside the table, a number outside -1..1, and a speed that is
                 not finite.
         """
-        speeds = _numbers("target_speed", target_speed, (self.num_trucks,)).astype(np.float32)
+        # What is beyond float32 is infinite there.
+        with np.errstate(over="ignore"):
+            speeds = _numbers("target_speed", target_speed, (self.num_trucks,)).astype(np.float32)
         if not np.isfinite(speeds).all():
             truck = int(np.flatnonzero(~np.isfinite(speeds))[0])
             raise ValueError(f"target_speed[{truck}]: {speeds[truck]}; a finite number is needed")
@@ -318,12 +320,12 @@ def _vehicles(given: Sequence[tuple[str, str]] | Sequence[int] | None) -> tuple[
     if len(given) == 0:
         raise ValueError("vehicles: empty; give None for the first vehicle")
     if all(isinstance(vehicle, tuple | list) for vehicle in given):
-        pairs: list[Any] = [tuple(vehicle) for vehicle in given]  # type: ignore[arg-type]
+        pairs: list[Any] = [tuple(vehicle) for vehicle in given]
         for index, pair in enumerate(pairs):
             if len(pair) != 2 or not all(isinstance(name, str) for name in pair):
                 raise TypeError(f"vehicles[{index}]: {pair!r}; names of vehicle and load are needed")
         return pairs, None
-    rows = [checked_integer(f"vehicles[{index}]", vehicle) for index, vehicle in enumerate(given)]  # type: ignore[arg-type]
+    rows = [checked_integer(f"vehicles[{index}]", vehicle) for index, vehicle in enumerate(given)]
     return None, [within(f"vehicles[{index}]", row, 0, 2**32) for index, row in enumerate(rows)]
 
 

@@ -24,10 +24,10 @@ def checked_state(
     trucks in this world of a benchmark."""
     if not isinstance(state, Mapping):
         raise TypeError(f"state: {type(state).__name__}; what Batch.state() gives is needed")
-    needed = [*COLUMNS, "stream", "world"]
-    missing = [name for name in needed if name not in state]
+    names = [*COLUMNS, "stream", "world"]
+    missing = [name for name in names if name not in state]
     if missing:
-        raise ValueError(f"state: {missing[0]} is missing; Batch.state() gives all of {', '.join(needed)}")
+        raise ValueError(f"state: {missing[0]} is missing; Batch.state() gives all of {', '.join(names)}")
     check_world(scenario, state["world"], fingerprint)
     columns = []
     for name, dtype in COLUMNS.items():

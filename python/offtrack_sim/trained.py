@@ -239,7 +239,7 @@ def _array(tensor: Any) -> Floats:
     if hasattr(tensor, "detach"):
         tensor = tensor.detach().cpu()
         tensor = (tensor.float() if tensor.is_floating_point() else tensor).numpy()
-    return _numbers("layers", tensor).astype(np.float32)
+    return np.asarray(numbers("layers", tensor, "numbers are needed"), np.float32)
 
 
 def _vector(name: str, values: npt.ArrayLike) -> Floats:

@@ -241,7 +241,10 @@ def test_wrong_outputs_and_requests_are_refused() -> None:
     for request, message in [
         ({"envs": [3]}, "envs: 3; the batch has trucks 0..3"),
         ({"envs": [0], "routes": ["20m/N-left-3"]}, 'routes: "20m/N-left-3"; the batch drives 16m/'),
-        ({"envs": [0], "starts": [(2.0, 0.0)]}, r"starts\[0\]: 2 of the largest start error; must lie in -1..1"),
+        (
+            {"envs": [0], "starts": [(2.0, 0.0)]},
+            r"starts\[0\].offset: 2; must lie in -1..1, a fraction of the largest error or range",
+        ),
         ({"envs": [0], "seeds": [1, 2]}, "seeds: 2 of them; 1 are needed"),
         ({"envs": [0], "seeds": [1], "streams": [(1, 2)]}, "seeds, streams: give one of them"),
     ]:
