@@ -156,7 +156,7 @@ fn an_episode_begins_on_the_stated_route_at_the_stated_start_and_the_next_one_is
             (Begin { route: Some(75), ..Begin::default() }, "routes: 75; the world has routes 0..75".to_owned()),
             (
                 Begin { start: Some(Start { offset: f32::NAN, heading: 0.0, ..Start::default() }), ..Begin::default() },
-                "starts[0]: NaN of the largest start error; must lie in -1..1".to_owned(),
+                "starts[0].offset: NaN; must lie in -1..1, a fraction of the largest error or range".to_owned(),
             ),
         ] {
             assert_eq!(
