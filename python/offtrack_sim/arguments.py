@@ -69,7 +69,7 @@ def check_commands(name: str, commands: npt.NDArray[Any]) -> None:
 def names_of(routes: Iterable[str]) -> list[str]:
     """Names of routes as a list."""
     if isinstance(routes, str):
-        return [routes]
+        return [text("routes", routes)]
     try:
         names = list(itertools.islice(routes, MOST_NAMES + 1))
     except TypeError:
@@ -79,7 +79,7 @@ def names_of(routes: Iterable[str]) -> list[str]:
     wrong = next((name for name in names if not isinstance(name, str)), None)
     if wrong is not None:
         raise TypeError(f"routes: {wrong!r}; names of routes or roundabouts are needed")
-    return names
+    return [text("routes", name) for name in names]
 
 
 def names_of_values(values: Iterable[str]) -> list[str]:
@@ -94,9 +94,13 @@ def names_of_values(values: Iterable[str]) -> list[str]:
 
 
 def text(name: str, value: object) -> str:
-    """The value, if it is a text."""
+    """The value, if it is a text that can be written."""
     if not isinstance(value, str):
         raise TypeError(f"{name}: {value!r}; a text is needed")
+    try:
+        value.encode()
+    except UnicodeEncodeError:
+        raise ValueError(f"{name}: {value!r} is no UTF-8") from None
     return value
 
 

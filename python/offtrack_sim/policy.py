@@ -108,7 +108,7 @@ class Policy:
             ValueError: Where the batch has other extras or another action table, or takes commands where the policy
                 chooses among actions; the message says which.
         """
-        if not hasattr(batch, "action_table"):
+        if not hasattr(batch, "n_commands"):
             raise TypeError(f"batch: {batch!r}; a Batch or an Observer is needed")
         if self.head != "levels" and not batch.n_commands:
             raise ValueError(f"{self.name}: gives commands; {batch.scenario} has a table of actions")

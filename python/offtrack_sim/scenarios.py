@@ -46,7 +46,7 @@ class Benchmark:
     ) -> None:
         self.name = text("name", name)
         if isinstance(keys, str):
-            self.text = keys
+            self.text = text("keys", keys)
         elif isinstance(keys, Mapping):
             self.text = _offtrack.scenario_of_keys(json.dumps(_plain("", keys)))
         else:
@@ -159,14 +159,9 @@ def whole(scenario: Scenario) -> Benchmark:
 def _source(scenario: str | os.PathLike[str]) -> str:
     needed = "the name of a benchmark, the path of its file, a Benchmark or a dict of its keys is needed"
     try:
-        source = text("scenario", os.fspath(scenario))
+        return text("scenario", os.fspath(scenario))
     except TypeError:
         raise TypeError(f"scenario: {scenario!r}; {needed}") from None
-    try:
-        source.encode()
-    except UnicodeEncodeError:
-        raise ValueError(f"scenario: {scenario!r} is no UTF-8; {needed}") from None
-    return source
 
 
 def _is_file(source: str) -> bool:
@@ -191,7 +186,9 @@ def _plain(key: str, value: Any) -> Any:
         raise TypeError(f"{key}: {value!r}; a number, a text, a list or a table is needed")
     if isinstance(value, float) and not math.isfinite(value):
         raise ValueError(f"{key}: {value}; must be finite")
-    return value
+    if isinstance(value, int) and not -(2**63) <= value < 2**63:
+        raise ValueError(f"{key}: an integer of {value.bit_length()} bits; at most 63 and a sign are read")
+    return text(key, value) if isinstance(value, str) else value
 
 
 def _without_removed(value: Any) -> Any:

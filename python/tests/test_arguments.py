@@ -149,6 +149,7 @@ def begun() -> Any:
         (lambda: sim.Policy.shipped().act([["0"] * 69]), "observations"),
         (lambda: sim.Policy.shipped().act(np.zeros((1, 69), complex)), "observations"),
         (lambda: sim.Policy.shipped().check("attard2023"), "batch"),
+        (lambda: sim.Policy.shipped().check(sim.Policy.shipped()), "batch"),
         (lambda: sim.export.to_onnx(None, "a.onnx"), "policy"),
         (lambda: sim.export.save("a", layers(((69, 9), 9)), values=5), "values"),
         (lambda: sim.speed_control(None, 8.0, 8.0), "observer"),
@@ -191,6 +192,12 @@ def test_a_value_of_a_wrong_type_is_refused_by_the_arguments_name(call: Callable
         (lambda: batch_of_two().begin([0, 0], seeds=[1, 2]), "envs: 0 stands twice"),
         (lambda: sim.Batch(device=""), 'device: \'\'; "cpu", "gpu" or'),
         (lambda: sim.Batch("\ud800"), "scenario: .* is no UTF-8"),
+        (lambda: sim.Batch(routes=["\ud800"]), "routes: .* is no UTF-8"),
+        (lambda: sim.Benchmark({"vehicle": "\ud800"}), "vehicle: .* is no UTF-8"),
+        (
+            lambda: sim.benchmark("attard2023").changed({"reward.failure": 10**400}),
+            "reward.failure: an integer of 1329",
+        ),
         (lambda: sim.Batch(routes=["16m"], split="tset"), 'split: "tset"; must be one of train, '),
         (
             lambda: sim.evaluate(
