@@ -31,7 +31,7 @@ pub fn file_of(name: &str) -> Option<&Path> {
 #[group(skip)]
 pub struct Choice {
     /// A policy file, `pursuit` (pure pursuit of the lane's centre), `random`, `follows` or `yields` (rules among other
-    /// vehicles), or the name of a shipped policy; `yields:POLICY` is a file or a shipped policy that waits by the rule.
+    /// vehicles), or the name of a shipped policy; `yields:POLICY` is a file or a shipped one that waits by the rule.
     /// Without it the policy shipped for the benchmark or, where there is none, the first shipped one with its actions
     /// and extras.
     #[arg(long)]

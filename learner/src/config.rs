@@ -273,7 +273,7 @@ impl Config {
         Config::read_for(file, None, settings, &Flags::default())
     }
 
-    /// Reads a training file as [`Config::read_with`] does, for another benchmark alone if one is given, and with flags.
+    /// Reads a training file as [`Config::read_with`] does with flags, for another benchmark alone if one is given.
     pub fn read_for(file: &Path, benchmark: Option<&str>, settings: &[String], flags: &Flags) -> Result<Config, Error> {
         let mut table = file::resolved(file)?;
         if let Some(benchmark) = benchmark {

@@ -23,7 +23,7 @@ MOST_VALUES = 1000
 def mode_name(name: str, mode: str | enum.Enum) -> str:
     """``"next_step"`` for ``AutoresetMode.NEXT_STEP`` or its name, and so on."""
     given = mode.name if isinstance(mode, enum.Enum) else text(name, mode)
-    known = [mode.name.lower() for mode in AutoresetMode]
+    known = [other.name.lower() for other in AutoresetMode]
     if given.lower() not in known:
         raise ValueError(f'{name}: "{given}"; must be one of {", ".join(known)}')
     return given.lower()

@@ -38,14 +38,14 @@ impl Choice {
     ///
     /// A map without a ring, with several where none is chosen, or without one near the point that chooses it.
     pub fn of(&self, file: &Path, map: &Map) -> Result<Ring, Error> {
+        let rings = map.rings();
         let listed = || {
-            let rings = map.rings();
             let centres = rings.iter().map(|ring| format!("{:.1},{:.1}", ring.centre.x, ring.centre.y));
             centres.collect::<Vec<String>>().join("  ")
         };
         let nearest = map.nearest(self.ring.unwrap_or(DVec2::ZERO))?;
         match self.ring {
-            None if 1 < map.rings().len() => {
+            None if 1 < rings.len() => {
                 let expected = format!("the map has several; one of {}", listed());
                 Err(Reader::of(file).invalid("ring", "missing", expected))
             }

@@ -2,8 +2,8 @@
 
 use glam::DVec2;
 
-use crate::geometry::Outline;
 use crate::geometry::area::{Area, counter_clockwise, points};
+use crate::geometry::{Outline, Piece};
 
 /// Distance between the points of an outline at which clearance is computed (m).
 const BETWEEN_POINTS: f64 = 0.05;
@@ -114,17 +114,13 @@ fn swept_by_side([a, b]: [DVec2; 2], [c, d]: [DVec2; 2]) -> Vec<Vec<DVec2>> {
 
 /// Where two segments cross, if they do.
 fn crossing([a, b]: [DVec2; 2], [c, d]: [DVec2; 2]) -> Option<DVec2> {
-    let (one, other) = (b - a, d - c);
-    let turn = one.perp_dot(other);
-    let [along, along_other] = [(c - a).perp_dot(other) / turn, (c - a).perp_dot(one) / turn];
-    // Parallel ones cross nowhere: no range holds an infinite or undefined number.
-    ((0.0..=1.0).contains(&along) && (0.0..=1.0).contains(&along_other)).then(|| a + along * one)
+    Piece::Segment { from: a, to: b }.meetings(&Piece::Segment { from: c, to: d }).pop()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Curve, Piece};
+    use crate::geometry::Curve;
 
     #[test]
     fn the_point_of_a_body_nearest_to_a_kerb_may_lie_on_a_side() {
