@@ -16,6 +16,8 @@ packed=$(mktemp -d)
 trap 'rm -rf -- "$packed"' EXIT
 cargo build --release --locked --features gpu
 cp "${CARGO_TARGET_DIR:-target}/release/offtrack" "$packed/offtrack"
+# Its tests read files of the folder where they are compiled, and a build folder may hold those of another clone.
+touch tests/simulator/main.rs
 tests=$(cargo test --release --locked --features gpu --test simulator --no-run 2>&1 | sed -n 's/.*(\(.*simulator-[0-9a-f]*\))$/\1/p')
 cp "$tests" "$packed/simulator"
 strip "$packed/offtrack" "$packed/simulator"
