@@ -1,4 +1,4 @@
-//! Times how a policy acts on a graphics device: by its kernel, and by the launches of the tensor library.
+//! Times how a policy acts on a graphics device: by its kernel, and by the learner's products of matrices.
 //!
 //! `cargo run --release --features gpu --example acting -- [ROUNDS] [TRUCKS]`: 21 rounds of 1024 trucks unless stated;
 //! `-- shader` prints the kernel's module for narrow networks, for benches/machine_code.py.
@@ -20,6 +20,7 @@ use offtrack::world::World;
 use offtrack_evaluation::provenance;
 use offtrack_learner::backend::Backend;
 use offtrack_learner::config::Config;
+use offtrack_learner::exchange::Actor;
 use offtrack_learner::network::Mlp;
 use offtrack_learner::rollout::Rollout;
 use offtrack_policy::device::DevicePolicy;
@@ -34,7 +35,7 @@ const TURN: u32 = 4;
 enum Driven {
     Random(Simulator),
     Kernel(Simulator, Box<DevicePolicy>),
-    Launches(Box<dyn Rollout>, Mlp),
+    Products(Box<dyn Rollout>, Actor),
 }
 
 impl Driven {
@@ -45,7 +46,7 @@ impl Driven {
                 let batch = simulator.on_device().ok_or("the trucks are not on a device")?;
                 policy.step(batch)?;
             }
-            Driven::Launches(rollout, actor) => rollout.drive(actor)?,
+            Driven::Products(rollout, actor) => rollout.drive(actor)?,
         }
         Ok(())
     }
@@ -53,7 +54,7 @@ impl Driven {
     fn wait(&self) -> Result<(), Box<dyn Error>> {
         match self {
             Driven::Random(simulator) | Driven::Kernel(simulator, _) => simulator.wait()?,
-            Driven::Launches(rollout, _) => rollout.wait()?,
+            Driven::Products(rollout, _) => rollout.wait()?,
         }
         Ok(())
     }
@@ -81,8 +82,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let world = Arc::new(World::bake(&scenario)?);
     let routes = scenario.split(Split::Test).to_vec();
     let backend = Backend::on_device(None)?;
-    let Backend::Device(shared) = &backend else { return Err("no device".into()) };
-    let engine = Engine::Gpu { device: shared.gpu.clone(), columns: Columns::new() };
+    let Backend::Device(device) = &backend else { return Err("no device".into()) };
+    let engine = Engine::Gpu { device: (**device).clone(), columns: Columns::new() };
     let simulator = || Simulator::on(engine.clone(), world.clone(), n_envs, 0, RouteChoice::Drawn(routes.clone()));
     let mut config = Config::read(Path::new("gpu"))?;
     (config.n_envs, config.replay_buffer.capacity) = (n_envs, n_envs);
@@ -94,12 +95,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     for policy in [shipped, large] {
         let mut rollout = backend.rollout(&config, &world, routes.clone(), None)?;
         rollout.set_normalisation(&policy.normalisation);
-        let actor = Mlp::of_policy(&policy).on(&backend.placement().plain());
-        let kernel = DevicePolicy::new(&shared.gpu, &policy, &world, Choice::Sampled { seed: 0 })?;
+        let actor = backend.actor(Mlp::of_policy(&policy));
+        let kernel = DevicePolicy::new(device, &policy, &world, Choice::Sampled { seed: 0 })?;
         let mut driven = [
             Driven::Random(simulator()?),
             Driven::Kernel(simulator()?, Box::new(kernel)),
-            Driven::Launches(rollout, actor),
+            Driven::Products(rollout, actor),
         ];
         let mut times = [Vec::new(), Vec::new(), Vec::new()];
         // The first round compiles what it needs.
@@ -111,7 +112,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 }
             }
         }
-        let ratio = median(times[2].iter().zip(&times[1]).map(|(launches, kernel)| launches / kernel));
+        let ratio = median(times[2].iter().zip(&times[1]).map(|(products, kernel)| products / kernel));
         let of = |times: &[f64]| {
             let fastest = times.iter().copied().fold(f64::INFINITY, f64::min);
             json!({ "median_us": median(times.iter().copied()).round(), "fastest_us": fastest.round() })
@@ -120,7 +121,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             "policy": policy.name,
             "at_random": of(&times[0]),
             "by_kernel": of(&times[1]),
-            "by_tensor_library": of(&times[2]),
+            "by_products": of(&times[2]),
             "ratio": (100.0 * ratio).round() / 100.0,
         }));
     }

@@ -4,10 +4,11 @@
     python3 benches/model.py                       # docs/results/machine_code.json
     python3 benches/model.py MENDED.json           # another file of benches/machine_code.py
 
-No card was measured. A kernel takes the longest of four times: its instructions, its bytes of memory, those through the
-second-level cache, and the starts of its workgroups. Instructions of each part of a kernel are multiplied by how often
-subgroups run through it: RULES below, with the counts of the example `lanes`. Reads of the world's tables are left out:
-neighbours read the same, so they stay in the first-level cache. Standard library only.
+A kernel takes the longest of four times: its instructions, its bytes of memory, those through the second-level cache,
+and the starts of its workgroups. An NVIDIA H200 takes up to twice as long: docs/notebook/gpu.md. Instructions of each
+part of a kernel are multiplied by how often subgroups run through it: RULES below, with the counts of the example
+`lanes`. Reads of the world's tables are left out: neighbours read the same, so they stay in the first-level cache.
+Standard library only.
 """
 
 import argparse

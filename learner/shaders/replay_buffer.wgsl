@@ -1,6 +1,25 @@
 // The replay buffer on a device: a ring of the latest steps of every truck, filled from the simulator's columns and
-// sampled into the learner's tensors. Its twin on the host is learner/src/replay_buffer.rs. Structs and bindings are
+// sampled into the learner's buffers. Its twin on the host is learner/src/replay_buffer.rs. Structs and bindings are
 // printed from learner/src/rollout/device/memory_kernels.rs.
+
+// Normalises what the actor sees; a thread a value.
+@compute @workgroup_size(WORKGROUP)
+fn look(thread: Thread) {
+    let element = index_of(thread);
+    let env = element / facts.n_values;
+    let value = element % facts.n_values;
+    if facts.n_envs <= env { return; }
+    let normal = (value_of(env, value) - values[value].mean) * values[value].factor;
+    seen[element] = clamp(normal, -facts.clip, facts.clip);
+}
+
+// A value of a truck's observation, or of what stands behind it.
+fn value_of(env: u32, value: u32) -> f32 {
+    if value < N_VALUES { return observation[env * N_VALUES + value]; }
+    let own = value - N_VALUES;
+    if own < facts.n_extras { return extras[env * N_EXTRAS + own]; }
+    return around[env * N_AROUND + own - facts.n_extras];
+}
 
 // Samples an action for every truck from the actor's output.
 @compute @workgroup_size(WORKGROUP)
@@ -37,18 +56,7 @@ fn store_before(thread: Thread) {
     let value = element % facts.n_values;
     if facts.n_envs <= env { return; }
     let row = now.slot * facts.n_envs + env;
-    if value < N_VALUES {
-        held_observation[row * facts.n_values + value] = observation[env * N_VALUES + value];
-    } else {
-        let own = value - N_VALUES;
-        var seen = 0.0;
-        if own < facts.n_extras {
-            seen = extras[env * N_EXTRAS + own];
-        } else {
-            seen = around[env * N_AROUND + own - facts.n_extras];
-        }
-        held_observation[row * facts.n_values + value] = seen;
-    }
+    held_observation[row * facts.n_values + value] = value_of(env, value);
     if value == 0u {
         held_action[row] = action[env];
         // A truck whose episode ends in the step is on another route after it.

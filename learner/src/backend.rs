@@ -2,17 +2,25 @@
 
 use std::sync::Arc;
 
+#[cfg(feature = "gpu")]
+use offtrack::gpu;
 use offtrack::layout::{N_AROUND, N_VALUES, ObservedExtras};
 use offtrack::world::World;
 
 use crate::config::{Config, Device};
+#[cfg(feature = "gpu")]
+use crate::device::Network;
 use crate::error::Error;
+use crate::exchange::Actor;
 use crate::memory;
 use crate::mirror::Mirror;
+use crate::network::Mlp;
 #[cfg(feature = "gpu")]
-use crate::rollout::device::{DeviceRollout, Shared};
+use crate::rollout::device::DeviceRollout;
 use crate::rollout::{Rollout, host::HostRollout};
-use crate::sac::Placement;
+#[cfg(feature = "gpu")]
+use crate::sac::device::DeviceSac;
+use crate::sac::{Learner, Sac};
 
 /// The processor, or an opened device.
 #[derive(Clone)]
@@ -21,7 +29,7 @@ pub enum Backend {
     Host,
     /// All of them on one device.
     #[cfg(feature = "gpu")]
-    Device(Box<Shared>),
+    Device(Box<gpu::Device>),
 }
 
 impl Backend {
@@ -36,7 +44,8 @@ impl Backend {
     /// The first device whose adapter's name contains `adapter`.
     #[cfg(feature = "gpu")]
     pub fn on_device(adapter: Option<&str>) -> Result<Backend, Error> {
-        Ok(Backend::Device(Box::new(Shared::open(adapter)?)))
+        let device = gpu::Device::open(adapter).map_err(offtrack::simulator::Error::from)?;
+        Ok(Backend::Device(Box::new(device)))
     }
 
     /// An error: this program has no devices.
@@ -51,16 +60,26 @@ impl Backend {
         match self {
             Backend::Host => "cpu".to_owned(),
             #[cfg(feature = "gpu")]
-            Backend::Device(shared) => shared.gpu.name(),
+            Backend::Device(device) => device.name(),
         }
     }
 
-    /// Where the learner's tensors are.
-    pub fn placement(&self) -> Placement {
-        match self {
-            Backend::Host => Placement::Host,
+    /// A learner there, with random weights.
+    pub fn learner(&self, config: &Config, n_values: usize, n_actions: usize) -> Result<Box<dyn Learner>, Error> {
+        let (learning, seed) = (&config.learning, u64::from(config.seed));
+        Ok(match self {
+            Backend::Host => Box::new(Sac::new(learning, n_values, n_actions, seed)?),
             #[cfg(feature = "gpu")]
-            Backend::Device(shared) => Placement::Device(shared.tensors.clone()),
+            Backend::Device(device) => Box::new(DeviceSac::new(device, learning, n_values, n_actions, seed)?),
+        })
+    }
+
+    /// A network there, to act.
+    pub fn actor(&self, network: Mlp) -> Actor {
+        match self {
+            Backend::Host => Actor::Host(network),
+            #[cfg(feature = "gpu")]
+            Backend::Device(device) => Actor::Device(Network::of(device, &network)),
         }
     }
 
@@ -112,25 +131,29 @@ impl Backend {
         Ok(match self {
             Backend::Host => Box::new(HostRollout::<N>::new(config, world, routes, mirror)?),
             #[cfg(feature = "gpu")]
-            Backend::Device(shared) => Box::new(DeviceRollout::<N>::new(shared, config, world, routes, mirror)?),
+            Backend::Device(device) => Box::new(DeviceRollout::<N>::new(device, config, world, routes, mirror)?),
         })
     }
 
-    /// The result of `work`. On a device a panic of the tensor library becomes an error: it panics where a device
-    /// fails.
+    /// The result of `work`. On a device a panic of a library becomes an error where the device has failed, and so do
+    /// numbers that cannot be read there.
     pub fn guarded<T>(&self, work: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
         match self {
             Backend::Host => work(),
             #[cfg(feature = "gpu")]
-            Backend::Device(shared) => {
-                crate::panics::caught(work, || shared.check().err()).map_err(|error| match error {
+            Backend::Device(device) => {
+                crate::panics::caught(work, || failure(device)).map_err(|error| match error {
                     // What the driver reported says more than the panic that followed.
-                    Error::Device(message) => {
-                        Error::Device(shared.check().err().map_or(message, |error| error.to_string()))
-                    }
+                    Error::Device(message) => Error::Device(failure(device).map_or(message, |error| error.to_string())),
                     error => error,
                 })
             }
         }
     }
+}
+
+/// What a device failed by, if it did.
+#[cfg(feature = "gpu")]
+fn failure(device: &gpu::Device) -> Option<Error> {
+    device.check().err().map(|error| offtrack::simulator::Error::from(error).into())
 }

@@ -6,12 +6,15 @@
 
 pub mod error; // what can go wrong
 pub mod session; // the loop: act, learn
+pub mod exchange; // what trucks and learner give each other
 pub mod sac; // soft actor-critic
 pub mod ppo; // proximal policy optimisation, which refines its policy
 pub mod network; // multi-layer perceptrons
 pub mod pass; // their gradients on the processor
 pub mod adam; // the optimizer
 pub mod shards; // a batch on several threads
+#[cfg(feature = "gpu")]
+pub mod device; // buffers and kernels of a device that both share
 pub mod rollout; // acting, stepping, remembering, sampling: on the host, on a device
 pub mod replay_buffer; // transitions on the host
 pub mod mirror; // mirror augmentation
@@ -19,7 +22,7 @@ pub mod exploration; // random actions among the policy's
 pub mod level_replay; // routes that fail are drawn more often
 pub mod memory; // what a run takes of it, before it begins
 pub mod backend; // the choice of processor or device
-pub mod panics; // of the tensor library, where a device fails
+pub mod panics; // of libraries, where a device fails
 pub mod config; // a training file
 pub mod run; // a training run in its folder
 pub mod train; // from a config to a report, in a folder

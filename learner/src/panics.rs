@@ -1,4 +1,4 @@
-//! Panics while a device works: the tensor library panics where its device fails.
+//! Panics while a device works: a library may panic where its device fails.
 //!
 //! Only a panic of a library becomes an error. One of our own code is a fault of the program: it is reported with its
 //! place and goes on, whatever hook the process has.

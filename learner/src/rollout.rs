@@ -1,13 +1,11 @@
 //! Acting, stepping, remembering and sampling: what the training loop asks of the trucks and their replay buffer.
 //!
-//! On the host or on a graphics device. These are the only modules that name both a column of the simulator and a
-//! tensor.
+//! On the host or on a graphics device.
 
 #[cfg(feature = "gpu")]
 pub mod device;
 pub mod host;
 
-use burn::tensor::Tensor;
 use offtrack::layout::{Ended, N_AROUND, N_EXTRAS, N_VALUES};
 use offtrack::simulator::Simulator;
 use offtrack_policy::Normalisation;
@@ -15,10 +13,10 @@ use offtrack_policy::Normalisation;
 use crate::checkpoint::{Columns, Stored};
 use crate::config::Refinement;
 use crate::error::Error;
+use crate::exchange::{Actor, Sample, TdErrors};
 use crate::mirror::Mirror;
 use crate::network::Mlp;
 use crate::ppo::steps::Steps;
-use crate::sac::Transitions;
 
 /// Some episodes that ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,7 +60,7 @@ pub trait Rollout {
 
     /// One step of every truck with actions sampled from the actor's distribution, remembered. `env_steps` were made
     /// before.
-    fn step(&mut self, actor: &Mlp, env_steps: u64) -> Result<(), Error>;
+    fn step(&mut self, actor: &Actor, env_steps: u64) -> Result<(), Error>;
 
     /// A refinement's steps of every truck with actions sampled from the actor's distribution, for learning from them
     /// at
@@ -70,13 +68,13 @@ pub trait Rollout {
     fn collect(&mut self, actor: &Mlp, settings: &Refinement) -> Result<Steps, Error>;
 
     /// One step of every truck with actions sampled from the actor's distribution, not kept at all.
-    fn drive(&mut self, actor: &Mlp) -> Result<(), Error>;
+    fn drive(&mut self, actor: &Actor) -> Result<(), Error>;
 
-    /// Samples a batch, in shards.
-    fn sample(&mut self) -> Result<Vec<Transitions>, Error>;
+    /// Samples a batch.
+    fn sample(&mut self) -> Result<Sample, Error>;
 
-    /// Sets priorities from the absolute TD errors of the latest sample, `[B, 1]` a shard.
-    fn set_td_errors(&mut self, errors: Vec<Tensor<2>>) -> Result<(), Error>;
+    /// Sets priorities from the absolute TD errors of the latest sample.
+    fn set_td_errors(&mut self, errors: TdErrors) -> Result<(), Error>;
 
     /// The episodes that ended since this was last called. Where counting them means waiting for a device, none unless
     /// `wait`.

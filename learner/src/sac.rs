@@ -1,70 +1,65 @@
 //! Soft actor-critic over a discrete action table, in the order of P. Christodoulou, "Soft Actor-Critic for Discrete
 //! Action Settings" (2019).
 //!
-//! One learner for the processor and for a graphics device. Only three parts differ: on the processor a batch is
-//! learned in shards, one thread each, with gradients by the chain rule written out, Adam is one fused pass, and single
-//! numbers are plain; on a device gradients and Adam are tensor operations, and an update waits for nothing. The number
-//! of shards does not depend on the machine, so neither does the result.
+//! [`Sac`] learns on the processor: a batch in shards, one thread each, with gradients by the chain rule written out.
+//! The number of shards does not depend on the machine, so neither does the result. On a graphics device the same
+//! update is made by kernels of our own, see [`device`]. [`Learner`] is what the training loop asks of either.
 
 mod critics;
+#[cfg(feature = "gpu")]
+pub mod device;
 mod entropy;
 mod gradients;
-mod scalar;
 mod state;
 
 use std::mem::take;
 
-use burn::module::Module;
 use burn::tensor::{Device, Int, Tensor};
 use rand::SeedableRng;
 use rand::rngs::SmallRng;
 
 use crate::adam::Adam;
+use crate::checkpoint::{Columns, Stored};
 use crate::config::Learning;
 use crate::error::Error;
+use crate::exchange::{Actor, Sample, TdErrors};
 use crate::network::Mlp;
 use crate::shards::{N_SHARDS, Shards};
 use critics::Twins;
 use entropy::EntropyCoefficient;
-use scalar::Scalar;
 
-/// Where a learner's tensors are.
-#[derive(Debug, Clone)]
-pub enum Placement {
-    /// Tensors in the processor's memory.
-    Host,
-    /// Tensors in the memory of this graphics device.
-    Device(Device),
-}
+/// A learner, wherever it is: what its networks are, and an update.
+pub trait Learner {
+    /// Goes on with this actor, and makes it the policy. It must have the layers of the learner's own.
+    fn set_actor(&mut self, actor: &Mlp);
 
-impl Placement {
-    /// The device for tensors without gradients.
-    pub fn plain(&self) -> Device {
-        match self {
-            Placement::Host => Device::flex(),
-            Placement::Device(device) => device.clone(),
-        }
-    }
+    /// The actor, where the learner is.
+    fn actor(&self) -> Actor;
 
-    /// For the networks that learn. On a device the tensor library differentiates. On the host it must not record them:
-    /// their gradients are written out, and every update would leave its parameters in a graph that nothing frees.
-    fn learning(&self) -> Device {
-        match self {
-            Placement::Host => self.plain(),
-            Placement::Device(device) => device.clone().autodiff(),
-        }
-    }
+    /// The EMA of the actor over its latest updates, in the processor's memory: the policy. Waits for a device.
+    fn actor_ema(&self) -> Mlp;
 
-    fn on_host(&self) -> bool {
-        matches!(self, Placement::Host)
-    }
+    /// The entropy coefficient. Waits for a device.
+    fn entropy_coefficient(&self) -> f32;
 
-    fn scalar(&self, value: f32) -> Scalar {
-        match self {
-            Placement::Host => Scalar::Host(value),
-            Placement::Device(device) => Scalar::Device(Box::new(Tensor::full([1, 1], value, device))),
-        }
-    }
+    /// One gradient step of critics, actor and entropy coefficient on a sample. Learning rates are multiplied by
+    /// `rate_factor`. Returns the absolute TD error of each transition.
+    fn update(&mut self, sample: Sample, rate_factor: f64) -> Result<TdErrors, Error>;
+
+    /// Figures of the updates since this was last called, summed, and the number of those updates. Waits for a device.
+    fn take_sums(&mut self) -> (Update, u64);
+
+    /// The first of the latest figures that is not finite, with its name; none where they are not at hand.
+    fn diverged(&self) -> Option<(&'static str, f32)>;
+
+    /// The first of the learner's numbers that is not finite: its name and value. Waits for a device.
+    fn broken(&self) -> Option<(String, f32)>;
+
+    /// Adds the learner's columns. Waits for a device.
+    fn save(&self, columns: &mut Columns);
+
+    /// Continues from a learner of the same sizes.
+    fn restore(&mut self, stored: &Stored) -> Result<(), Error>;
 }
 
 /// Some transitions as tensors without gradients. B is their number.
@@ -109,13 +104,12 @@ impl Update {
     }
 }
 
-/// The figures of [`Update`], in its order, where the learner is.
-type Figures = [Scalar; 4];
+/// The figures of [`Update`], in its order.
+type Figures = [f32; 4];
 
-/// The learner: networks, optimizers, and the entropy coefficient.
+/// The learner on the processor: networks, optimizers, and the entropy coefficient.
 pub struct Sac {
     learning: Learning,
-    placement: Placement,
     actor: Mlp,
     critics: Twins,
     target_critics: Twins,
@@ -132,14 +126,10 @@ pub struct Sac {
 
 impl Sac {
     /// A learner with random weights; its policy is close to uniform.
-    pub fn new(
-        learning: &Learning,
-        n_values: usize,
-        n_actions: usize,
-        seed: u64,
-        placement: Placement,
-    ) -> Result<Sac, Error> {
-        let device = placement.learning();
+    pub fn new(learning: &Learning, n_values: usize, n_actions: usize, seed: u64) -> Result<Sac, Error> {
+        // Gradients are written out: were operations recorded, every update would leave its parameters in a graph that
+        // nothing frees.
+        let device = Device::flex();
         let rng = &mut SmallRng::seed_from_u64(seed);
         let sizes: Vec<usize> =
             [n_values].into_iter().chain(learning.hidden.iter().copied()).chain([n_actions]).collect();
@@ -150,50 +140,43 @@ impl Sac {
         };
         let critics = Twins { first: critic(), second: critic() };
         Ok(Sac {
-            target_critics: critics.valid(),
-            actor_ema: actor.valid(),
-            actor_optimizer: Adam::new(placement.on_host()),
-            critic_optimizer: Adam::new(placement.on_host()),
-            entropy_coefficient: EntropyCoefficient::new(&learning.entropy, n_actions, |value| placement.scalar(value)),
+            target_critics: critics.clone(),
+            actor_ema: actor.clone(),
+            actor_optimizer: Adam::default(),
+            critic_optimizer: Adam::default(),
+            entropy_coefficient: EntropyCoefficient::new(&learning.entropy, n_actions),
             n_updates: 0,
-            shards: Shards::new(if placement.on_host() { N_SHARDS } else { 0 })?,
-            sums: [0.0; 4].map(|zero| placement.scalar(zero)),
+            shards: Shards::new(N_SHARDS)?,
+            sums: [0.0; 4],
             n_summed: 0,
             learning: learning.clone(),
             actor,
             critics,
-            placement,
         })
     }
+}
 
-    /// Goes on with this actor, and makes it the policy. It must have the layers of the learner's own.
-    pub fn set_actor(&mut self, actor: &Mlp) {
+impl Learner for Sac {
+    fn set_actor(&mut self, actor: &Mlp) {
         let parameters = || actor.parameters().into_iter().map(|(_, values)| values).collect();
-        self.actor = self.actor.with_parameters(parameters(), &self.placement.learning());
-        self.actor_ema = self.actor_ema.with_parameters(parameters(), &self.placement.plain());
+        self.actor = self.actor.with_parameters(parameters(), &Device::flex());
+        self.actor_ema = self.actor_ema.with_parameters(parameters(), &Device::flex());
     }
 
-    /// The actor, without gradients.
-    pub fn actor(&self) -> Mlp {
-        self.actor.valid()
+    fn actor(&self) -> Actor {
+        Actor::Host(self.actor.clone())
     }
 
-    /// The EMA of the actor over its latest updates, in the processor's memory: the policy. Waits for a device.
-    pub fn actor_ema(&self) -> Mlp {
-        match &self.placement {
-            Placement::Host => self.actor_ema.clone(),
-            Placement::Device(_) => self.actor_ema.on(&Device::flex()),
-        }
+    fn actor_ema(&self) -> Mlp {
+        self.actor_ema.clone()
     }
 
-    /// The entropy coefficient. Waits for a device.
-    pub fn entropy_coefficient(&self) -> f32 {
-        self.entropy_coefficient.value().read()
+    fn entropy_coefficient(&self) -> f32 {
+        self.entropy_coefficient.value()
     }
 
-    /// One gradient step of critics, actor and entropy coefficient on the batch that the shards make up. Learning rates
-    /// are multiplied by `rate_factor`. Returns the absolute TD error of each transition, `[B, 1]` a shard.
-    pub fn update(&mut self, shards: Vec<Transitions>, rate_factor: f64) -> Vec<Tensor<2>> {
+    fn update(&mut self, sample: Sample, rate_factor: f64) -> Result<TdErrors, Error> {
+        let shards = sample.on_host()?;
         let n_rows: usize = shards.iter().map(|shard| shard.observation.dims()[0]).sum();
         let gradients = self.shards.map(shards, |shard| {
             let fraction = shard.observation.dims()[0] as f32 / n_rows as f32;
@@ -203,48 +186,73 @@ impl Sac {
         let [mut critic_gradients, mut actor_gradients] = [Vec::new(), Vec::new()];
         let mut td_errors = Vec::new();
         for shard in gradients {
-            figures = Some(figures.map_or(shard.figures.clone(), |sums| added(&sums, &shard.figures)));
+            figures = Some(figures.map_or(shard.figures, |sums| added(&sums, &shard.figures)));
             critic_gradients.push(shard.critics);
             actor_gradients.push(shard.actor);
             td_errors.push(shard.td_errors);
         }
-        let Some(figures) = figures else { return td_errors };
+        let Some(figures) = figures else { return Ok(TdErrors::Host(td_errors)) };
 
-        self.n_updates += 1;
-        let Learning { critic_learning_rate, actor_learning_rate, tau, target_interval, actor_ema_rate, .. } =
-            self.learning;
-        let tau = if self.n_updates.is_multiple_of(target_interval as u64) { tau } else { 0.0 };
+        let Step { rates: [actor_rate, critic_rate], follow: [ema_rate, tau], is_learning } =
+            Step::of(&self.learning, &mut self.n_updates, rate_factor);
         let [critics, target] = [&mut self.critics, &mut self.target_critics].map(take);
         (self.critics, self.target_critics) =
-            self.critic_optimizer.step(critics, target, critic_gradients, critic_learning_rate * rate_factor, tau);
-        // Until the critics know the policy its rates are 0. It is stepped nevertheless: its leaves must be new ones in
-        // each update, or the graph of every update stays in memory.
-        let is_learning = self.learning.actor_delay < self.n_updates;
-        let (rate, ema_rate) =
-            if is_learning { (actor_learning_rate * rate_factor, actor_ema_rate) } else { (0.0, 0.0) };
+            self.critic_optimizer.step(critics, target, critic_gradients, critic_rate, tau);
         let [actor, ema] = [&mut self.actor, &mut self.actor_ema].map(take);
-        (self.actor, self.actor_ema) = self.actor_optimizer.step(actor, ema, actor_gradients, rate, ema_rate);
+        (self.actor, self.actor_ema) = self.actor_optimizer.step(actor, ema, actor_gradients, actor_rate, ema_rate);
         if is_learning {
-            self.entropy_coefficient.update(&figures[2]);
+            self.entropy_coefficient.update(figures[2]);
         }
 
         self.sums = added(&self.sums, &figures);
         self.n_summed += 1;
-        td_errors
+        Ok(TdErrors::Host(td_errors))
     }
 
-    /// Figures of the updates since this was last called, summed, and the number of those updates. Waits for a device.
-    pub fn take_sums(&mut self) -> (Update, u64) {
-        let zeros = [0.0; 4].map(|zero| self.placement.scalar(zero));
-        let sums = std::mem::replace(&mut self.sums, zeros).map(|sum| sum.read());
-        (update(sums), take(&mut self.n_summed))
+    fn take_sums(&mut self) -> (Update, u64) {
+        (update(take(&mut self.sums)), take(&mut self.n_summed))
     }
 
-    /// The first of the latest figures that is not finite, with its name; none where they are not at hand.
-    pub fn diverged(&self) -> Option<(&'static str, f32)> {
-        let [critic_loss, actor_loss, entropy, value] =
-            [0, 1, 2, 3].map(|n: usize| self.sums[n].known().unwrap_or_default());
-        not_finite(&Update { critic_loss, actor_loss, entropy, value })
+    fn diverged(&self) -> Option<(&'static str, f32)> {
+        not_finite(&update(self.sums))
+    }
+
+    fn broken(&self) -> Option<(String, f32)> {
+        self.first_broken()
+    }
+
+    fn save(&self, columns: &mut Columns) {
+        self.put(columns);
+    }
+
+    fn restore(&mut self, stored: &Stored) -> Result<(), Error> {
+        self.take(stored)
+    }
+}
+
+/// What an update does beside its gradients.
+struct Step {
+    /// Learning rates of the actor and of the critics.
+    rates: [f64; 2],
+    /// How far the actor's EMA and the target critics follow.
+    follow: [f64; 2],
+    /// Whether actor and entropy coefficient learn: until the critics know the policy they stay.
+    is_learning: bool,
+}
+
+impl Step {
+    /// That of the next update, which is counted.
+    fn of(learning: &Learning, n_updates: &mut u64, rate_factor: f64) -> Step {
+        *n_updates += 1;
+        let tau = if n_updates.is_multiple_of(learning.target_interval as u64) { learning.tau } else { 0.0 };
+        let is_learning = learning.actor_delay < *n_updates;
+        let of_actor =
+            if is_learning { [learning.actor_learning_rate * rate_factor, learning.actor_ema_rate] } else { [0.0; 2] };
+        Step {
+            rates: [of_actor[0], learning.critic_learning_rate * rate_factor],
+            follow: [of_actor[1], tau],
+            is_learning,
+        }
     }
 }
 
@@ -255,7 +263,7 @@ pub fn not_finite(update: &Update) -> Option<(&'static str, f32)> {
 }
 
 fn added(sums: &Figures, figures: &Figures) -> Figures {
-    std::array::from_fn(|n| sums[n].plus(&figures[n]))
+    std::array::from_fn(|n| sums[n] + figures[n])
 }
 
 fn update([critic_loss, actor_loss, entropy, value]: [f32; 4]) -> Update {

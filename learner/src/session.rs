@@ -10,12 +10,13 @@ use offtrack_policy::{Activation, Frames, Head, Layer, Normalisation, Policy};
 use super::backend::Backend;
 use super::checkpoint::{Columns, Stored};
 use super::config::{Config, Refinement};
+use super::exchange::Sample;
 use super::memory;
 use super::mirror::Mirror;
 use super::network::Mlp;
 use super::ppo::Ppo;
 use super::rollout::Rollout;
-use super::sac::{Sac, Transitions, Update};
+use super::sac::{Learner, Update};
 use crate::error::Error;
 use offtrack_evaluation::policies;
 
@@ -26,7 +27,7 @@ pub struct Session {
     /// None without mirror augmentation.
     mirror: Option<Mirror>,
     rollout: Box<dyn Rollout>,
-    sac: Sac,
+    sac: Box<dyn Learner>,
     /// None before the refinement.
     ppo: Option<Ppo>,
     /// None while actions are random.
@@ -42,13 +43,7 @@ impl Session {
         let mirror = config.learning.mirror_augmentation.then(|| Mirror::of(&world)).transpose()?;
         Ok(Session {
             rollout: backend.rollout(config, &world, routes, mirror.clone())?,
-            sac: Sac::new(
-                &config.learning,
-                n_values(&world),
-                world.actions.len(),
-                u64::from(config.seed),
-                backend.placement(),
-            )?,
+            sac: backend.learner(config, n_values(&world), world.actions.len())?,
             ppo: None,
             normalisation: None,
             config: config.clone(),
@@ -121,8 +116,8 @@ impl Session {
     }
 
     /// The learner.
-    pub fn sac(&self) -> &Sac {
-        &self.sac
+    pub fn sac(&self) -> &dyn Learner {
+        self.sac.as_ref()
     }
 
     /// Whether the policy acts already; until then actions are random.
@@ -189,8 +184,8 @@ impl Session {
     }
 
     /// One update on the latest sample.
-    pub fn update_on(&mut self, sample: Vec<Transitions>, rate_factor: f64) -> Result<(), Error> {
-        let errors = self.sac.update(sample, rate_factor);
+    pub fn update_on(&mut self, sample: Sample, rate_factor: f64) -> Result<(), Error> {
+        let errors = self.sac.update(sample, rate_factor)?;
         self.rollout.set_td_errors(errors)
     }
 

@@ -110,16 +110,19 @@ fn the_feature_gpu_is_named_only_where_an_engine_or_device_is_chosen() {
     let crates = [
         // The choice of a device, its failure, and a policy there.
         ("evaluation/src", 30, &[("device.rs", 4), ("error.rs", 2), ("placed.rs", 2)][..]),
-        // Backends, what a device alone counts and shares, and tests there.
+        // Backends, what both give each other, what a device alone counts, and tests there.
         (
             "learner/src",
             50,
             &[
-                ("backend.rs", 9),
+                ("backend.rs", 14),
+                ("exchange.rs", 11),
                 ("level_replay.rs", 2),
+                ("lib.rs", 1),
                 ("replay_buffer.rs", 1),
                 ("rollout.rs", 1),
                 ("run/lost_device_tests.rs", 1),
+                ("sac.rs", 1),
                 ("sac/device_tests.rs", 1),
             ],
         ),

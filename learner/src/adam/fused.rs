@@ -1,4 +1,4 @@
-//! Adam in a single pass over the parameters, for a learner on the processor.
+//! Adam in a single pass over the parameters, on the processor.
 //!
 //! A step is bound by memory bandwidth, not by arithmetic: parameters, gradients, moments and followers are each read
 //! and written once, in place. The pass is split into independent blocks, so the result is the same for any number of
@@ -19,11 +19,25 @@ const SUM: usize = 1024;
 
 /// The optimizer: nothing but its state.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Fused(pub(super) State);
+pub struct Adam(State);
 
-impl Fused {
-    /// See [`super::Adam::step`].
-    pub(super) fn step<M: Module>(
+impl Adam {
+    /// The state.
+    pub fn state(&self) -> State {
+        self.0.clone()
+    }
+
+    /// Continues from a state.
+    pub fn restore(&mut self, state: State) {
+        self.0 = state;
+    }
+
+    /// Moves `network` against the sum of the shards' gradients, then `follower` toward it by `tau`: 0 leaves it, 1
+    /// makes it a copy.
+    ///
+    /// Both are given up and returned so that no copy has to be made; a parameter that is also held elsewhere is
+    /// copied.
+    pub fn step<M: Module>(
         &mut self,
         network: M,
         follower: M,
@@ -205,7 +219,7 @@ mod tests {
     #[test]
     fn steps_are_those_of_the_librarys_adam_on_the_sum_of_the_shards() {
         let mut expected = random(1, &Device::flex().autodiff());
-        let (mut found, mut follower, mut adam) = (expected.clone(), random(2, &Device::flex()), Fused::default());
+        let (mut found, mut follower, mut adam) = (expected.clone(), random(2, &Device::flex()), Adam::default());
         let mut library = AdamConfig::new().with_epsilon(EPSILON as f32).init();
         let begun = weights(&expected);
         for step in 0..50 {
@@ -226,7 +240,7 @@ mod tests {
         for follow in [0.25, 1.0] {
             let [network, follower] = begun.clone();
             let parts = gradients(&network, 0);
-            let (network, follower) = Fused::default().step(network, follower, parts, 0.01, follow);
+            let (network, follower) = Adam::default().step(network, follower, parts, 0.01, follow);
             let way = |(from, to): (&f32, &f32)| (1.0 - follow as f32) * from + follow as f32 * to;
             assert_eq!(
                 weights(&follower),
@@ -240,7 +254,7 @@ mod tests {
     fn a_parameter_without_a_gradient_stays_and_is_followed() {
         let begun = random(1, &Device::flex().autodiff());
         let parts = vec![GradientsParams::new(), GradientsParams::new()];
-        let (network, follower) = Fused::default().step(begun.clone(), random(2, &Device::flex()), parts, 0.01, 1.0);
+        let (network, follower) = Adam::default().step(begun.clone(), random(2, &Device::flex()), parts, 0.01, 1.0);
         assert_eq!(weights(&network), weights(&begun));
         assert_eq!(weights(&follower), weights(&begun));
     }
@@ -252,7 +266,7 @@ mod tests {
         assert!(2 * BLOCK < sizes[0] * sizes[1] && (sizes[0] * sizes[1]) % SUM != 0);
         let stepped = |n_threads| {
             let mut network = Mlp::new(&sizes, 1.0, &mut SmallRng::seed_from_u64(1), &Device::flex().autodiff());
-            let (mut follower, mut adam) = (network.valid(), Fused::default());
+            let (mut follower, mut adam) = (network.valid(), Adam::default());
             for step in 0..3 {
                 let parts = gradients(&network, step);
                 let pool = ThreadPoolBuilder::new().num_threads(n_threads).build().unwrap();
@@ -267,15 +281,15 @@ mod tests {
 
     #[test]
     fn a_state_put_back_goes_on_bit_for_bit() {
-        let step = |adam: &mut Fused, network: Mlp, seed| {
+        let step = |adam: &mut Adam, network: Mlp, seed| {
             let (follower, parts) = (network.valid(), gradients(&network, seed));
             adam.step(network, follower, parts, 0.01, 0.1).0
         };
-        let mut adam = Fused::default();
+        let mut adam = Adam::default();
         let network = step(&mut adam, random(1, &Device::flex().autodiff()), 1);
-        let mut put_back = Fused(State { n_steps: adam.0.n_steps, moments: adam.0.moments.clone() });
+        let mut put_back = Adam(State { n_steps: adam.0.n_steps, moments: adam.0.moments.clone() });
         let expected = weights(&step(&mut adam, network.clone(), 2));
         assert_eq!(weights(&step(&mut put_back, network.clone(), 2)), expected);
-        assert_ne!(weights(&step(&mut Fused::default(), network, 2)), expected);
+        assert_ne!(weights(&step(&mut Adam::default(), network, 2)), expected);
     }
 }

@@ -50,8 +50,8 @@ impl Ppo {
         let [critic_loss, actor_loss, entropy, value] = stored.array::<f32, 4>(SUMS)?;
         self.shuffling = Generator::stored(stored, SHUFFLING)?;
         (self.actor, self.actor_ema, self.critic) = (actor, actor_ema, critic);
-        self.actor_optimizer.restore(actor_state, &device);
-        self.critic_optimizer.restore(critic_state, &device);
+        self.actor_optimizer.restore(actor_state);
+        self.critic_optimizer.restore(critic_state);
         (self.n_iterations, self.n_summed) = (n_iterations, n_summed);
         self.sums = Update { critic_loss, actor_loss, entropy, value };
         Ok(())

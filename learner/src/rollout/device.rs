@@ -1,40 +1,36 @@
 //! Trucks and replay buffer on a graphics device: nothing leaves it.
 //!
-//! The simulator writes observations into a buffer that a tensor owns. Kernels read the simulator's columns in place
-//! and write samples into buffers of other tensors. Both sides submit to one queue. The tensor library queues its work
-//! before it submits it, so it is flushed before every submission of ours, and nothing waits.
+//! Kernels read the simulator's columns in place, and write samples into buffers that the learner is bound to. All of
+//! them submit to one queue, and nothing waits.
 
 mod buffers;
 mod levels;
 mod memory_kernels;
-mod shared;
 
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use burn::tensor::{Tensor, TensorData};
 use bytemuck::{bytes_of, cast_slice};
-use offtrack::gpu::{Kernels, Slice};
+use offtrack::gpu::{Columns as External, Device, Kernels, Slice};
 use offtrack::layout::random;
-use offtrack::layout::{Column, Ended, N_AROUND, N_EXTRAS, N_VALUES};
+use offtrack::layout::{Ended, N_VALUES};
 use offtrack::simulator::{Engine, RouteChoice, Simulator, Tally};
 use offtrack::world::World;
 use offtrack_policy::{LIMIT, Normalisation};
-use wgpu::{PollType, SubmissionIndex};
+use wgpu::{BindGroup, Buffer, CommandEncoder, PollType, SubmissionIndex};
 
 use super::{Episodes, Rollout, RouteEnd, n_around};
 use crate::checkpoint::{Columns, Stored};
 use crate::config::{Config, Refinement};
+use crate::device::{Batch, Forward, NUMBER, Network};
 use crate::error::Error;
+use crate::exchange::{Actor, Sample, TdErrors};
 use crate::level_replay::LevelReplay;
 use crate::mirror::Mirror;
 use crate::network::Mlp;
 use crate::ppo::steps::Steps;
-use crate::sac::Transitions;
 use buffers::{Buffers, check_capacity};
 use memory_kernels::{BLOCK, Binding, Facts, Kernel, Now, Value};
-pub use shared::Shared;
-use shared::{Owned, floats};
 
 /// Maximum number of steps queued ahead of the device. Queued work holds memory.
 const MAX_QUEUED_STEPS: usize = 16;
@@ -44,21 +40,18 @@ pub struct DeviceRollout<const N: usize> {
     config: Config,
     routes: Vec<u32>,
     mirror: Option<Mirror>,
-    shared: Shared,
+    gpu: Device,
     kernels: Kernels<Kernel>,
     simulator: Simulator,
     facts: Facts,
     buffers: Buffers,
-    /// The simulator's column of observations, `[n_envs, N_VALUES]`.
-    observation: Tensor<2>,
-    /// The simulator's column of extras, `[n_envs, N_EXTRAS]`.
-    extras: Tensor<2>,
-    /// The simulator's column of other vehicles where the networks observe them, `[n_envs, N_AROUND]`.
-    around: Option<Tensor<2>>,
-    /// Mean and factor of each value, `[1, N]`.
-    normalisation: [Tensor<2>; 2],
-    sample: Transitions,
-    _owned: Vec<Owned>,
+    /// The actor's pass from what it sees to its output.
+    forward: Forward,
+    /// Kernels' bindings, for all but the one that is bound to the learner's TD errors.
+    groups: Vec<Option<BindGroup>>,
+    /// The TD errors that the last of them is bound to.
+    bound_to: Option<Buffer>,
+    sample: Batch,
     /// Steps of all trucks appended, and steps made.
     n_appended: u64,
     n_steps: u32,
@@ -78,17 +71,17 @@ impl<const N: usize> DeviceRollout<N> {
     /// Trucks at the start of their first episodes, and an empty replay buffer of `config.replay_buffer.capacity`
     /// transitions.
     pub fn new(
-        shared: &Shared,
+        gpu: &Device,
         config: &Config,
         world: &Arc<World>,
         routes: Vec<u32>,
         mirror: Option<Mirror>,
     ) -> Result<DeviceRollout<N>, Error> {
-        DeviceRollout::with_seeds(shared, config, world, routes, mirror, seeds(config.seed, 0))
+        DeviceRollout::with_seeds(gpu, config, world, routes, mirror, seeds(config.seed, 0))
     }
 
     fn with_seeds(
-        shared: &Shared,
+        gpu: &Device,
         config: &Config,
         world: &Arc<World>,
         routes: Vec<u32>,
@@ -97,26 +90,17 @@ impl<const N: usize> DeviceRollout<N> {
     ) -> Result<DeviceRollout<N>, Error> {
         let (n_envs, n_rows) = (config.n_envs, config.learning.batch);
         let n_slots = config.replay_buffer.capacity.div_ceil(n_envs);
-        check_capacity::<N>(shared, config, n_slots * n_envs)?;
-        let device = &shared.tensors;
-        let zeros = |width: usize| Tensor::<2>::zeros([n_rows, width], device);
-        let observation = Tensor::<2>::zeros([n_envs, N_VALUES], device);
-        let extras = Tensor::<2>::zeros([n_envs, N_EXTRAS], device);
-        let around = (0 < n_around(N)).then(|| Tensor::<2>::zeros([n_envs, N_AROUND], device));
-        let sample = Transitions {
-            observation: zeros(N),
-            action: Tensor::from_data(TensorData::new(vec![0i32; n_rows], [n_rows, 1]), device),
-            reward: zeros(1),
-            discount: zeros(1),
-            next_observation: zeros(N),
-            weight: Tensor::ones([n_rows, 1], device),
+        check_capacity::<N>(gpu, config, n_slots * n_envs)?;
+        let numbers = |width: usize| gpu.empty("sample", (n_rows * width) as u64 * NUMBER);
+        let sample = Batch {
+            observation: numbers(N),
+            action: numbers(1),
+            reward: numbers(1),
+            discount: numbers(1),
+            next_observation: numbers(N),
+            weight: gpu.filled("sample", cast_slice(&vec![1.0f32; n_rows])),
         };
-        shared.flush()?;
-        let mut owned = vec![floats(&observation)?, floats(&extras)?];
-        owned.extend(around.as_ref().map(floats).transpose()?);
-        let external = [Column::Observation, Column::Extras, Column::Around];
-        let columns = external.into_iter().zip(&owned).map(|(column, owned)| (column, owned.slice.clone())).collect();
-        let engine = Engine::Gpu { device: shared.gpu.clone(), columns };
+        let engine = Engine::Gpu { device: gpu.clone(), columns: External::new() };
         let level_replay = config.level_replay.map(|settings| LevelReplay::new(settings, routes.clone()));
         let drawn = level_replay.as_ref().map_or_else(|| routes.clone(), |replay| replay.list().to_vec());
         let simulator = Simulator::on(engine, world.clone(), n_envs, config.seed, RouteChoice::Drawn(drawn))?;
@@ -142,20 +126,18 @@ impl<const N: usize> DeviceRollout<N> {
             correction: priority.map_or(0.0, |priority| priority.correction as f32),
         };
         let mut rollout = DeviceRollout {
-            kernels: memory_kernels::compile(&shared.gpu.device),
+            kernels: memory_kernels::compile(&gpu.device),
             buffers: Buffers::default(),
             config: config.clone(),
             routes,
             mirror,
-            shared: shared.clone(),
+            gpu: gpu.clone(),
+            forward: Forward::new(gpu, n_envs),
+            groups: Vec::new(),
+            bound_to: None,
             simulator,
             facts,
-            observation,
-            extras,
-            around,
-            normalisation: [0.0, 1.0].map(|value| Tensor::full([1, N], value, device)),
             sample,
-            _owned: owned,
             n_appended: 0,
             n_steps: 0,
             n_samples: 0,
@@ -166,65 +148,68 @@ impl<const N: usize> DeviceRollout<N> {
             route_ends: Vec::new(),
         };
         rollout.buffers = rollout.make_buffers()?;
+        rollout.groups = Kernel::ALL.map(|kernel| rollout.bound(kernel)).into();
         rollout.set_normalisation(&Normalisation::none(N));
-        shared.check()?;
+        rollout.check()?;
         Ok(rollout)
-    }
-
-    /// The trucks' observations with the first extras, and other vehicles, behind them, normalised, `[n_envs, N]`.
-    fn normalised(&self) -> Tensor<2> {
-        let [mean, factor] = self.normalisation.clone();
-        let n_extras = self.facts.n_extras as usize;
-        let extras = (0 < n_extras).then(|| self.extras.clone().narrow(1, 0, n_extras));
-        let beside: Vec<Tensor<2>> = extras.into_iter().chain(self.around.clone()).collect();
-        let own = self.observation.clone();
-        let observed = if beside.is_empty() { own } else { Tensor::cat([vec![own], beside].concat(), 1) };
-        ((observed - mean) * factor).clamp(-LIMIT, LIMIT)
     }
 
     fn has_priorities(&self) -> bool {
         self.config.replay_buffer.priority.is_some()
     }
 
-    /// One step of every truck: by the actor's output, or with random actions where there is none.
-    fn step_by(&mut self, logits: Option<&Tensor<2>>, remember: bool) -> Result<(), Error> {
-        self.shared.flush()?;
-        let output = logits.map(floats).transpose()?;
-        let device = &self.shared.gpu.device;
-        let chosen_from = output.as_ref().map(|output| (Binding::logits, &output.slice));
+    /// What a kernel is bound to; none where that is the learner's.
+    fn bound(&self, kernel: Kernel) -> Option<BindGroup> {
+        let is_own = !kernel.bindings().contains(&Binding::td_error);
+        is_own.then(|| self.buffers.group(&self.gpu.device, &self.kernels, kernel, None))
+    }
+
+    /// Submits kernels, one after the other.
+    fn submit(&self, each: &[Kernel]) {
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        each.iter().for_each(|&kernel| add(&self.kernels, &self.groups, &self.facts, &mut encoder, kernel));
+        self.gpu.queue.submit([encoder.finish()]);
+    }
+
+    /// One step of every truck: by the actor, or with random actions where there is none.
+    fn step_by(&mut self, actor: Option<&Network>, remember: bool) -> Result<(), Error> {
         self.write_now();
         let (has_priorities, counts_ends) = (self.has_priorities(), self.level_replay.is_some());
-        let mut encoder = device.create_command_encoder(&Default::default());
-        let (kernels, facts, buffers) = (&self.kernels, &self.facts, &self.buffers);
-        let group = |kernel: Kernel| buffers.group(device, kernels, kernel, chosen_from);
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        let (kernels, groups, facts) = (&self.kernels, &self.groups, &self.facts);
+        if let Some(network) = actor {
+            add(kernels, groups, facts, &mut encoder, Kernel::Look);
+            let [seen, logits] = [Binding::seen, Binding::logits].map(|binding| self.buffers.slice(binding));
+            self.forward.add(&mut encoder, network, seen, logits);
+            add(kernels, groups, facts, &mut encoder, Kernel::Choose);
+        }
         let batch =
             self.simulator.on_device().ok_or_else(|| Error::Device("the simulator is not on a device".to_owned()))?;
-        if logits.is_some() {
-            memory_kernels::add(kernels, &mut encoder, &group(Kernel::Choose), Kernel::Choose, facts);
-        } else {
+        if actor.is_none() {
             batch.add_draw(&mut encoder);
         }
         if remember {
-            memory_kernels::add(kernels, &mut encoder, &group(Kernel::StoreBefore), Kernel::StoreBefore, facts);
+            add(kernels, groups, facts, &mut encoder, Kernel::StoreBefore);
         }
         batch.add_step(&mut encoder);
         if remember {
-            memory_kernels::add(kernels, &mut encoder, &group(Kernel::StoreAfter), Kernel::StoreAfter, facts);
+            add(kernels, groups, facts, &mut encoder, Kernel::StoreAfter);
             if has_priorities {
-                memory_kernels::add(kernels, &mut encoder, &group(Kernel::Admit), Kernel::Admit, facts);
+                add(kernels, groups, facts, &mut encoder, Kernel::Admit);
             }
             if counts_ends {
-                memory_kernels::add(kernels, &mut encoder, &group(Kernel::CountEnds), Kernel::CountEnds, facts);
+                add(kernels, groups, facts, &mut encoder, Kernel::CountEnds);
             }
             self.n_appended += 1;
         }
         batch.stepped();
         self.n_steps = self.n_steps.wrapping_add(1);
         if self.queued.len() == MAX_QUEUED_STEPS {
-            let waited = device.poll(PollType::Wait { submission_index: self.queued.pop_front(), timeout: None });
+            let waited =
+                self.gpu.device.poll(PollType::Wait { submission_index: self.queued.pop_front(), timeout: None });
             waited.map_err(|error| Error::Device(error.to_string()))?;
         }
-        self.queued.push_back(self.shared.gpu.queue.submit([encoder.finish()]));
+        self.queued.push_back(self.gpu.queue.submit([encoder.finish()]));
         if remember { self.replay_levels() } else { Ok(()) }
     }
 
@@ -242,7 +227,7 @@ impl<const N: usize> DeviceRollout<N> {
             step: self.n_steps,
             sample: self.n_samples,
         };
-        self.shared.gpu.queue.write_buffer(&self.buffers.slice(Binding::now).buffer, 0, bytes_of(&now));
+        self.gpu.queue.write_buffer(&self.buffers.slice(Binding::now).buffer, 0, bytes_of(&now));
     }
 }
 
@@ -262,8 +247,7 @@ impl<const N: usize> Rollout for DeviceRollout<N> {
     fn found_normalisation(&self, mirror: Option<&Mirror>) -> Result<Normalisation, Error> {
         let held = self.buffers.slice(Binding::held_observation);
         let size = (self.n_transitions() * N * size_of::<f32>()) as u64;
-        let bytes =
-            self.shared.gpu.read(&[Slice { size, ..held.clone() }]).map_err(offtrack::simulator::Error::from)?;
+        let bytes = self.gpu.read(&[Slice { size, ..held.clone() }]).map_err(offtrack::simulator::Error::from)?;
         // Bytes need not be aligned as floats are.
         let rows: Vec<[f32; N]> = bytes[0].chunks_exact(N * 4).map(bytemuck::pod_read_unaligned).collect();
         Ok(super::normalisation_of(rows, mirror))
@@ -284,20 +268,15 @@ impl<const N: usize> Rollout for DeviceRollout<N> {
             image_factor,
         };
         let rows: Vec<Value> = rows.map(value).collect();
-        self.shared.gpu.queue.write_buffer(&self.buffers.slice(Binding::values).buffer, 0, cast_slice(&rows));
-        let row = |values: &[f32]| {
-            Tensor::from_data(TensorData::new(values.to_vec(), [1, values.len()]), &self.shared.tensors)
-        };
-        self.normalisation = [row(&normalisation.mean), row(&normalisation.factor)];
+        self.gpu.queue.write_buffer(&self.buffers.slice(Binding::values).buffer, 0, cast_slice(&rows));
     }
 
     fn step_at_random(&mut self) -> Result<(), Error> {
         self.step_by(None, true)
     }
 
-    fn step(&mut self, actor: &Mlp, _: u64) -> Result<(), Error> {
-        let logits = actor.forward(self.normalised());
-        self.step_by(Some(&logits), true)
+    fn step(&mut self, actor: &Actor, _: u64) -> Result<(), Error> {
+        self.step_by(Some(actor.on_device()?), true)
     }
 
     /// An error: a refinement is on the processor, and a training file that asks for another is refused.
@@ -306,38 +285,32 @@ impl<const N: usize> Rollout for DeviceRollout<N> {
         Err(Error::setting("refinement", "given", expected))
     }
 
-    fn drive(&mut self, actor: &Mlp) -> Result<(), Error> {
-        let logits = actor.forward(self.normalised());
-        self.step_by(Some(&logits), false)
+    fn drive(&mut self, actor: &Actor) -> Result<(), Error> {
+        self.step_by(Some(actor.on_device()?), false)
     }
 
-    /// Samples a batch in one shard: the same tensors every time, with other values in them.
-    fn sample(&mut self) -> Result<Vec<Transitions>, Error> {
-        self.shared.flush()?;
+    /// Samples a batch: into the same buffers every time.
+    fn sample(&mut self) -> Result<Sample, Error> {
         self.write_now();
         let drawn: &[Kernel] = match self.has_priorities() {
             true => &[Kernel::SumBlocks, Kernel::AddUp, Kernel::PickByPriority, Kernel::Weigh],
             false => &[Kernel::Pick],
         };
-        self.submit(&[drawn, &[Kernel::Sample, Kernel::SampleNext]].concat(), None);
+        self.submit(&[drawn, &[Kernel::Sample, Kernel::SampleNext]].concat());
         self.n_samples = self.n_samples.wrapping_add(1);
-        Ok(vec![Transitions {
-            observation: self.sample.observation.clone(),
-            action: self.sample.action.clone(),
-            reward: self.sample.reward.clone(),
-            discount: self.sample.discount.clone(),
-            next_observation: self.sample.next_observation.clone(),
-            weight: self.sample.weight.clone(),
-        }])
+        Ok(Sample::Device(Box::new(self.sample.clone())))
     }
 
-    fn set_td_errors(&mut self, errors: Vec<Tensor<2>>) -> Result<(), Error> {
+    fn set_td_errors(&mut self, errors: TdErrors) -> Result<(), Error> {
+        let errors = errors.on_device()?;
         if self.has_priorities() {
-            self.shared.flush()?;
-            // A sample is one shard.
-            for errors in &errors {
-                self.submit(&[Kernel::SetPriorities], Some((Binding::td_error, &floats(errors)?.slice)));
+            let kernel = Kernel::SetPriorities;
+            if self.groups[kernel as usize].is_none() || self.bound_to.as_ref() != Some(&errors.buffer) {
+                let bound = Some((Binding::td_error, &errors));
+                let group = self.buffers.group(&self.gpu.device, &self.kernels, kernel, bound);
+                (self.groups[kernel as usize], self.bound_to) = (Some(group), Some(errors.buffer));
             }
+            self.submit(&[kernel]);
         }
         Ok(())
     }
@@ -359,11 +332,11 @@ impl<const N: usize> Rollout for DeviceRollout<N> {
     }
 
     fn wait(&self) -> Result<(), Error> {
-        self.shared.wait()
+        Ok(self.gpu.wait().map_err(offtrack::simulator::Error::from)?)
     }
 
     fn check(&self) -> Result<(), Error> {
-        self.shared.check()
+        Ok(self.gpu.check().map_err(offtrack::simulator::Error::from)?)
     }
 
     fn save<'a>(&'a self, columns: &mut Columns<'a>) {
@@ -375,7 +348,7 @@ impl<const N: usize> Rollout for DeviceRollout<N> {
         let seeds = seeds(self.config.seed, n_updates as u32);
         let world = self.simulator.world().clone();
         *self = DeviceRollout::with_seeds(
-            &self.shared,
+            &self.gpu,
             &self.config,
             &world,
             self.routes.clone(),
@@ -387,6 +360,19 @@ impl<const N: usize> Rollout for DeviceRollout<N> {
             self.simulator.draw_from(replay.list())?;
         }
         Ok(())
+    }
+}
+
+/// Adds a kernel that is bound to the commands.
+fn add(
+    kernels: &Kernels<Kernel>,
+    groups: &[Option<BindGroup>],
+    facts: &Facts,
+    encoder: &mut CommandEncoder,
+    kernel: Kernel,
+) {
+    if let Some(group) = &groups[kernel as usize] {
+        memory_kernels::add(kernels, encoder, group, kernel, facts);
     }
 }
 

@@ -18,6 +18,7 @@ use super::{Episodes, Rollout, RouteEnd};
 use crate::checkpoint::{Columns, Stored};
 use crate::config::{Config, Learning, Refinement};
 use crate::error::Error;
+use crate::exchange::{Actor, Sample, TdErrors};
 use crate::generator::Generator;
 use crate::level_replay::LevelReplay;
 use crate::memory;
@@ -26,7 +27,6 @@ use crate::network::{Mlp, sampled};
 use crate::pass::softmax;
 use crate::ppo::steps::Steps;
 use crate::replay_buffer::{ReplayBuffer, Rows};
-use crate::sac::Transitions;
 
 mod stacks;
 mod tensors;
@@ -230,7 +230,8 @@ impl<const N: usize> Rollout for HostRollout<N> {
         self.remember()
     }
 
-    fn step(&mut self, actor: &Mlp, env_steps: u64) -> Result<(), Error> {
+    fn step(&mut self, actor: &Actor, env_steps: u64) -> Result<(), Error> {
+        let actor = actor.on_host()?;
         self.begin_step();
         let (mut actions, n_actions) = (self.choose(actor), self.n_actions());
         if let Some(exploration) = &self.config.exploration {
@@ -294,26 +295,26 @@ impl<const N: usize> Rollout for HostRollout<N> {
         Ok(steps)
     }
 
-    fn drive(&mut self, actor: &Mlp) -> Result<(), Error> {
-        let actions = self.choose(actor);
+    fn drive(&mut self, actor: &Actor) -> Result<(), Error> {
+        let actions = self.choose(actor.on_host()?);
         self.make(&actions)
     }
 
-    fn sample(&mut self) -> Result<Vec<Transitions>, Error> {
+    fn sample(&mut self) -> Result<Sample, Error> {
         let learning = &self.config.learning;
         let mut sample = self.replay_buffer.sample(learning.batch, learning.gamma as f32, &mut self.sampling);
         if let Some(mirror) = &self.mirror {
             mirror.mirror_half(&mut sample, &mut self.sampling);
         }
         self.sampled_rows.clone_from(&sample.row);
-        Ok(shards(&sample, &self.normalisation, learning, &mut self.sampling))
+        Ok(Sample::Host(shards(&sample, &self.normalisation, learning, &mut self.sampling)))
     }
 
-    fn set_td_errors(&mut self, errors: Vec<Tensor<2>>) -> Result<(), Error> {
+    fn set_td_errors(&mut self, errors: TdErrors) -> Result<(), Error> {
         if self.replay_buffer.has_priorities() {
             let read =
                 |errors: Tensor<2>| errors.into_data().try_to_vec::<f32>().expect("TD errors of f32 critics are f32");
-            let errors: Vec<f32> = errors.into_iter().flat_map(read).collect();
+            let errors: Vec<f32> = errors.on_host()?.into_iter().flat_map(read).collect();
             self.replay_buffer.set_td_errors(&self.sampled_rows, &errors);
         }
         Ok(())

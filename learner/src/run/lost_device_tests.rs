@@ -6,16 +6,17 @@ use std::cell::Cell;
 use std::path::Path;
 use std::sync::Arc;
 
+use offtrack::gpu;
 use offtrack::layout::N_VALUES;
 use offtrack::scenario::{Scenario, Split};
 
 use super::metrics_file::MetricsFile;
 use super::*;
-use crate::rollout::device::Shared;
-use crate::sac::{Placement, Sac};
+use crate::device;
+use crate::sac::{Learner as _, Sac};
 
 /// A small run in `folder` on a device, and the device.
-fn run(folder: &Path, settings: &[&str]) -> (Run<'static>, Folder, Shared) {
+fn run(folder: &Path, settings: &[&str]) -> (Run<'static>, Folder, gpu::Device) {
     let small = [
         "n_envs=64",
         "replay_buffer.capacity=4000",
@@ -29,18 +30,18 @@ fn run(folder: &Path, settings: &[&str]) -> (Run<'static>, Folder, Shared) {
     let scenario = Scenario::named("attard2023").unwrap();
     let (world, routes) = (Arc::new(World::bake(&scenario).unwrap()), scenario.split(Split::Train).to_vec());
     let progress = Progress::new(&config, MetricsFile::create(folder.metrics()).unwrap(), Box::new(()));
-    let shared = Shared::least().unwrap();
-    let backend = Backend::Device(Box::new(shared.clone()));
+    let device = device::least();
+    let backend = Backend::Device(Box::new(device.clone()));
     let training = Session::new(&backend, &config, world.clone(), routes).unwrap();
     let routes = RouteCounts::new(&scenario, folder.routes());
-    (Run::new(backend, &config, &world, training, &folder, progress, routes), folder, shared)
+    (Run::new(backend, &config, &world, training, &folder, progress, routes), folder, device)
 }
 
 #[test]
 fn a_device_that_fails_ends_the_run_with_its_last_checkpoint_intact() {
     let place = tempfile::tempdir().unwrap();
-    let (mut run, folder, shared) = run(place.path(), &["steps=1000000", "checkpoint_minutes=0.0001"]);
-    let device = shared.gpu.device.clone();
+    let (mut run, folder, device) = run(place.path(), &["steps=1000000", "checkpoint_minutes=0.0001"]);
+    let device = device.device.clone();
     let asked = Cell::new(0);
     let error = run
         .learn(|| {
@@ -56,7 +57,7 @@ fn a_device_that_fails_ends_the_run_with_its_last_checkpoint_intact() {
     assert!(text.contains("checkpoint.safetensors is the last good checkpoint"), "{text}");
     assert!(asked.get() < 10_000, "the run went on without its device");
     let stored = Stored::read(&folder.checkpoint()).unwrap();
-    let mut host = Sac::new(&run.config.learning, N_VALUES, 9, 9, Placement::Host).unwrap();
+    let mut host = Sac::new(&run.config.learning, N_VALUES, 9, 9).unwrap();
     host.restore(&stored).unwrap();
     assert!(host.broken().is_none());
 }

@@ -1,9 +1,14 @@
 //! The learner on a device beside the learner on the host.
 
+#![cfg(feature = "gpu")]
+
+use super::device::DeviceSac;
 use super::*;
 use crate::checkpoint::{Columns, Stored};
 use crate::config::{Critics, Entropy};
+use crate::device::{self, Batch, numbers};
 use burn::tensor::TensorData;
+use offtrack::gpu;
 use rand::Rng;
 
 /// A small learner's settings.
@@ -32,27 +37,53 @@ fn learning() -> Learning {
     }
 }
 
-/// Where a device's part of the learner can run: on the processor's tensors, and on a device where there is one.
-fn devices() -> Vec<Device> {
-    Vec::from([
-        Device::flex(),
-        #[cfg(feature = "gpu")]
-        crate::rollout::device::Shared::least().unwrap().tensors,
-    ])
-}
-
-/// A random batch of 32 transitions with 6 values and 4 actions, the same on every device.
-fn random_batch(seed: u64, device: &Device) -> Transitions {
+/// A random batch of 32 transitions with 6 values and 4 actions, on the host and on a device.
+fn random_batch(seed: u64, gpu: &gpu::Device) -> [Sample; 2] {
     let mut rng = SmallRng::seed_from_u64(seed);
-    let mut floats = |width: usize, low: f32| -> Tensor<2> {
-        let values: Vec<f32> = (0..32 * width).map(|_| rng.random_range(low..1.0)).collect();
-        Tensor::from_data(TensorData::new(values, [32, width]), device)
-    };
+    let mut floats =
+        |width: usize, low: f32| -> Vec<f32> { (0..32 * width).map(|_| rng.random_range(low..1.0)).collect() };
     let (observation, next_observation) = (floats(6, -1.0), floats(6, -1.0));
     let (reward, discount, weight) = (floats(1, -1.0), floats(1, 0.0), floats(1, 0.5));
-    let actions: Vec<i32> = (0..32).map(|_| rng.random_range(0..4)).collect();
-    let action = Tensor::<2, Int>::from_data(TensorData::new(actions, [32, 1]), device);
-    Transitions { observation, action, reward, discount, next_observation, weight }
+    let action: Vec<i32> = (0..32).map(|_| rng.random_range(0..4)).collect();
+    let filled = |values: &[f32]| gpu.filled("sample", bytemuck::cast_slice(values));
+    let on_device = Batch {
+        observation: filled(&observation),
+        action: gpu.filled("sample", bytemuck::cast_slice(&action)),
+        reward: filled(&reward),
+        discount: filled(&discount),
+        next_observation: filled(&next_observation),
+        weight: filled(&weight),
+    };
+    let matrix = |values: Vec<f32>| -> Tensor<2> {
+        let width = values.len() / 32;
+        Tensor::from_data(TensorData::new(values, [32, width]), &Device::flex())
+    };
+    let on_host = Transitions {
+        observation: matrix(observation),
+        action: Tensor::<2, Int>::from_data(TensorData::new(action, [32, 1]), &Device::flex()),
+        reward: matrix(reward),
+        discount: matrix(discount),
+        next_observation: matrix(next_observation),
+        weight: matrix(weight),
+    };
+    [Sample::Host(vec![on_host]), Sample::Device(Box::new(on_device))]
+}
+
+/// All numbers of a learner, as it saves them.
+fn saved(learner: &dyn Learner) -> Stored {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("checkpoint.safetensors");
+    let mut columns = Columns::default();
+    learner.save(&mut columns);
+    columns.write(&file, String::new(), 0).unwrap();
+    Stored::read(&file).unwrap()
+}
+
+/// A learner on the processor with another one's numbers.
+fn copied(learner: &dyn Learner, learning: &Learning) -> Sac {
+    let mut copy = Sac::new(learning, 6, 4, 9).unwrap();
+    copy.restore(&saved(learner)).unwrap();
+    copy
 }
 
 /// The largest difference between all numbers of two learners, and where it is.
@@ -67,53 +98,89 @@ fn furthest(a: &Sac, b: &Sac) -> (f32, String) {
 
 #[test]
 fn an_update_on_a_device_is_that_on_the_host() {
-    for device in devices() {
-        let actor_alone = Entropy { in_target: false, ..learning().entropy };
-        for learning in
-            [learning(), Learning { layer_norm: true, critics: Critics::Minimum, entropy: actor_alone, ..learning() }]
-        {
-            let new = |seed, placement| Sac::new(&learning, 6, 4, seed, placement).unwrap();
-            let (mut host, mut on_device) = (new(3, Placement::Host), new(3, Placement::Device(device.clone())));
-            for step in 0..3 {
-                host.update(vec![random_batch(step, &Device::flex())], 0.5);
-                on_device.update(vec![random_batch(step, &device)], 0.5);
-            }
-            // Sums in another order: a few units in the last place of gradients, divided by their own size plus 1e-5 in
-            // Adam's first steps.
-            let (difference, name) = furthest(&host, &on_device);
-            assert!(difference < 3e-4, "{name}: {difference}");
-            let mut begun = new(3, Placement::Host);
-            begun.update(vec![random_batch(0, &Device::flex())], 0.0);
-            assert!(0.003 < furthest(&host, &begun).0, "three steps of 0.0015 are seen");
-            let ((found, n_updates), (expected, _)) = (on_device.take_sums(), host.take_sums());
-            assert_eq!((n_updates, on_device.take_sums().1), (3, 0));
-            for (found, expected) in [
-                (found.critic_loss, expected.critic_loss),
-                (found.actor_loss, expected.actor_loss),
-                (found.entropy, expected.entropy),
-                (found.value, expected.value),
-            ] {
-                assert!((found - expected).abs() < 1e-3 * expected.abs().max(1.0), "{found} {expected}");
-            }
+    let gpu = device::least();
+    let actor_alone = Entropy { in_target: false, ..learning().entropy };
+    for learning in [
+        learning(),
+        // Layers wider than a tile and narrower than one, and one that is neither.
+        Learning { hidden: vec![40, 7, 70], actor_delay: 1, ..learning() },
+        Learning { layer_norm: true, critics: Critics::Minimum, entropy: actor_alone, ..learning() },
+        Learning { hidden: vec![70, 9], layer_norm: true, ..learning() },
+    ] {
+        let mut host = Sac::new(&learning, 6, 4, 3).unwrap();
+        let mut on_device = DeviceSac::new(&gpu, &learning, 6, 4, 3).unwrap();
+        assert_eq!(copied(&on_device, &learning).numbers(), host.numbers());
+        for step in 0..3 {
+            let [here, there] = random_batch(step, &gpu);
+            let expected = host.update(here, 0.5).unwrap().on_host().unwrap().remove(0);
+            let expected = expected.into_data().try_to_vec::<f32>().unwrap();
+            let found = on_device.update(there, 0.5).unwrap().on_device().unwrap();
+            let found = numbers(&gpu, &found).unwrap();
+            let furthest = expected.iter().zip(&found).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+            assert!(furthest < 1e-3, "{furthest} in step {step}");
         }
+        // Sums in another order: a few units in the last place of gradients, divided by their own size plus 1e-5 in
+        // Adam's first steps.
+        let (difference, name) = furthest(&host, &copied(&on_device, &learning));
+        assert!(difference < 3e-4, "{name}: {difference} with {learning:?}");
+        let mut begun = Sac::new(&learning, 6, 4, 3).unwrap();
+        let [here, _] = random_batch(0, &gpu);
+        begun.update(here, 0.0).unwrap();
+        assert!(0.003 < furthest(&host, &begun).0, "three steps of 0.0015 are seen");
+        assert!((on_device.entropy_coefficient() - host.entropy_coefficient()).abs() < 1e-4);
+        let ((found, n_updates), (expected, _)) = (on_device.take_sums(), host.take_sums());
+        assert_eq!((n_updates, on_device.take_sums()), (3, (Update::default(), 0)));
+        for (found, expected) in [
+            (found.critic_loss, expected.critic_loss),
+            (found.actor_loss, expected.actor_loss),
+            (found.entropy, expected.entropy),
+            (found.value, expected.value),
+        ] {
+            assert!((found - expected).abs() < 1e-3 * expected.abs().max(1.0), "{found} {expected}");
+        }
+        let actor = on_device.actor();
+        let network = actor.on_device().unwrap();
+        let learned = numbers(&gpu, &network.parameters).unwrap();
+        let expected: Vec<f32> = host.actor.parameters().into_iter().flat_map(|(_, values)| values).collect();
+        assert_eq!(network.n_parameters(), expected.len());
+        assert!(learned.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 3e-4));
     }
 }
 
 #[test]
 fn a_learner_restored_on_a_device_has_the_numbers_of_the_host() {
+    let gpu = device::least();
     let learning = Learning { layer_norm: true, ..learning() };
-    let mut host = Sac::new(&learning, 6, 4, 3, Placement::Host).unwrap();
-    host.update(vec![random_batch(1, &Device::flex())], 1.0);
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("checkpoint.safetensors");
-    let mut columns = Columns::default();
-    host.save(&mut columns);
-    columns.write(&file, String::new(), 0).unwrap();
-    for device in devices() {
-        let mut restored = Sac::new(&learning, 6, 4, 4, Placement::Device(device)).unwrap();
-        restored.restore(&Stored::read(&file).unwrap()).unwrap();
-        assert_eq!(restored.numbers(), host.numbers());
-        assert_eq!(restored.take_sums(), (Update { ..host.take_sums().0 }, 1));
-        host.restore(&Stored::read(&file).unwrap()).unwrap();
-    }
+    let mut host = Sac::new(&learning, 6, 4, 3).unwrap();
+    let [here, _] = random_batch(1, &gpu);
+    host.update(here, 1.0).unwrap();
+    let mut restored = DeviceSac::new(&gpu, &learning, 6, 4, 4).unwrap();
+    restored.restore(&saved(&host)).unwrap();
+    assert_eq!(copied(&restored, &learning).numbers(), host.numbers());
+    assert!(restored.broken().is_none());
+    assert_eq!(restored.take_sums(), host.take_sums());
+    restored.set_actor(&host.actor_ema());
+    assert_eq!(restored.actor_ema().parameters(), host.actor_ema().parameters());
+    assert_ne!(host.actor.parameters(), host.actor_ema().parameters());
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn no_kernel_of_the_learner_spills_or_takes_more_registers_and_memory_of_a_card_than_stated() {
+    use super::device::kernels::{Kernel, source};
+    use crate::device::null_device::{Stated, check, stated};
+    let most: [Stated; Kernel::ALL.len()] = [
+        stated("gather", 24, 0, 0),
+        stated("multiply", 96, 9216, 0),
+        stated("normalise", 48, 1024, 0),
+        stated("find_errors", 48, 0, 0),
+        stated("sum_norms", 48, 1024, 0),
+        stated("normalise_back", 48, 1024, 0),
+        stated("add_figures", 48, 1024, 0),
+        stated("move_parameters", 48, 0, 0),
+    ];
+    assert_eq!(most.each_ref().map(|stated| stated.kernel), Kernel::ALL.map(Kernel::name));
+    let test = "sac::device_tests::\
+                no_kernel_of_the_learner_spills_or_takes_more_registers_and_memory_of_a_card_than_stated";
+    check(test, &source(), &most);
 }

@@ -2,8 +2,8 @@
 
 use burn::tensor::Device;
 
+use super::Sac;
 use super::critics::Twins;
-use super::{Sac, Scalar};
 use crate::checkpoint::{Columns, Stored};
 use crate::columns::{Named, moments, named, network, optimizer};
 use crate::error::Error;
@@ -12,8 +12,7 @@ use crate::error::Error;
 const STEPS: &str = "learner, steps";
 
 impl Sac {
-    /// Adds the learner's columns. Waits for a device.
-    pub fn save(&self, columns: &mut Columns) {
+    pub(super) fn put(&self, columns: &mut Columns) {
         for (name, values) in self.numbers() {
             columns.put(name, values);
         }
@@ -21,42 +20,39 @@ impl Sac {
             [&self.actor_optimizer, &self.critic_optimizer].map(|optimizer| optimizer.state().n_steps);
         columns.put("learner, updates", vec![self.n_updates, self.n_summed]);
         columns.put(STEPS, [actor, critics, self.entropy_coefficient.n_updates].map(|steps| steps as u32).to_vec());
-        columns.put("learner, sums", self.sums.iter().map(Scalar::read).collect::<Vec<_>>());
+        columns.put("learner, sums", self.sums.to_vec());
     }
 
-    /// Continues from a learner of the same sizes.
-    pub fn restore(&mut self, stored: &Stored) -> Result<(), Error> {
-        let (plain, learning) = (self.placement.plain(), self.placement.learning());
-        let twins = |names: [&str; 2], like: &Twins, device: &Device| -> Result<Twins, Error> {
+    pub(super) fn take(&mut self, stored: &Stored) -> Result<(), Error> {
+        let device = Device::flex();
+        let twins = |names: [&str; 2], like: &Twins| -> Result<Twins, Error> {
             Ok(Twins {
-                first: network(stored, names[0], &like.first, device)?,
-                second: network(stored, names[1], &like.second, device)?,
+                first: network(stored, names[0], &like.first, &device)?,
+                second: network(stored, names[1], &like.second, &device)?,
             })
         };
-        let actor = network(stored, "actor", &self.actor, &learning)?;
-        let actor_ema = network(stored, "actor EMA", &self.actor_ema, &plain)?;
-        let critics = twins(["critic 1", "critic 2"], &self.critics, &learning)?;
-        let target_critics = twins(["target 1", "target 2"], &self.target_critics, &plain)?;
+        let actor = network(stored, "actor", &self.actor, &device)?;
+        let actor_ema = network(stored, "actor EMA", &self.actor_ema, &device)?;
+        let critics = twins(["critic 1", "critic 2"], &self.critics)?;
+        let target_critics = twins(["target 1", "target 2"], &self.target_critics)?;
 
         let [actor_steps, critic_steps, entropy_steps] = stored.array::<u32, 3>(STEPS)?;
         let actor_state = optimizer(stored, STEPS, actor_steps, &named("actor", &actor))?;
         let critic_state = optimizer(stored, STEPS, critic_steps, &critics_named(&critics))?;
-        let [log, first, second] =
-            stored.array::<f32, 3>("entropy coefficient")?.map(|value| self.placement.scalar(value));
+        let [log, first, second] = stored.array::<f32, 3>("entropy coefficient")?;
         let [n_updates, n_summed] = stored.array("learner, updates")?;
-        let sums = stored.array::<f32, 4>("learner, sums")?.map(|sum| self.placement.scalar(sum));
+        let sums = stored.array::<f32, 4>("learner, sums")?;
 
         (self.actor, self.actor_ema, self.critics, self.target_critics) = (actor, actor_ema, critics, target_critics);
-        self.actor_optimizer.restore(actor_state, &plain);
-        self.critic_optimizer.restore(critic_state, &plain);
+        self.actor_optimizer.restore(actor_state);
+        self.critic_optimizer.restore(critic_state);
         (self.n_updates, self.n_summed, self.sums) = (n_updates, n_summed, sums);
         let coefficient = &mut self.entropy_coefficient;
         (coefficient.log, coefficient.moments, coefficient.n_updates) = (log, [first, second], entropy_steps as i32);
         Ok(())
     }
 
-    /// The first of the learner's numbers that is not finite: its name and value. Waits for a device.
-    pub fn broken(&self) -> Option<(String, f32)> {
+    pub(super) fn first_broken(&self) -> Option<(String, f32)> {
         self.numbers()
             .into_iter()
             .find_map(|(name, values)| Some((name, values.into_iter().find(|value| !value.is_finite())?)))
@@ -68,7 +64,7 @@ impl Sac {
         let moments: Vec<_> =
             states.into_iter().zip(&networks).flat_map(|(state, parameters)| moments(parameters, state)).collect();
         let [first, second] = &self.entropy_coefficient.moments;
-        let entropy = [&self.entropy_coefficient.log, first, second].map(Scalar::read).to_vec();
+        let entropy = vec![self.entropy_coefficient.log, *first, *second];
         let followers = [
             ("target 1", &self.target_critics.first),
             ("target 2", &self.target_critics.second),

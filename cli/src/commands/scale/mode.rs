@@ -12,6 +12,7 @@ use offtrack_evaluation::policies::Controller;
 use offtrack_learner::backend::Backend;
 use offtrack_learner::config::Config;
 use offtrack_learner::error::Error;
+use offtrack_learner::exchange::Actor;
 use offtrack_learner::network::Mlp;
 use offtrack_learner::rollout::Rollout;
 use offtrack_learner::session::Session;
@@ -87,7 +88,7 @@ pub(super) struct Setting<'a> {
     pub engine: &'a Engine,
     /// Name of the engine's adapter.
     pub adapter: &'a str,
-    /// The engine as a backend for tensors too, once a mode has needed that.
+    /// The engine as a backend of the learner too, once a mode has needed that.
     pub backend: &'a mut Option<Backend>,
     /// The world.
     pub world: &'a Arc<World>,
@@ -106,7 +107,7 @@ pub(super) enum Driven {
     /// See [`Mode::Random`].
     Random { simulator: Simulator, submission: usize },
     /// See [`Mode::Policy`] and [`Mode::LargePolicy`].
-    Acting { rollout: Box<dyn Rollout>, actor: Mlp },
+    Acting { rollout: Box<dyn Rollout>, actor: Actor },
     /// See [`Mode::Policy`], on a device: the policy is a kernel there.
     Placed { simulator: Box<Simulator>, policy: Box<dyn Controller> },
     /// See [`Mode::Training`].
@@ -215,7 +216,7 @@ impl Mode {
         if self != Mode::Training {
             let mut rollout = backend.rollout(&config, world, routes.to_vec(), None)?;
             rollout.set_normalisation(&learner.policy.normalisation);
-            return Ok(Driven::Acting { rollout, actor: learner.actor(self).on(&backend.placement().plain()) });
+            return Ok(Driven::Acting { rollout, actor: backend.actor(learner.actor(self)) });
         }
         let mut training = Session::new(backend, &config, world.clone(), routes.to_vec())?;
         while training.rollout().n_transitions() < config.replay_buffer.warmup || !training.rollout().can_sample() {

@@ -1,14 +1,14 @@
 //! The buffers that the replay buffer's kernels are bound to: its own, the simulator's columns and those of tensors.
 
 use bytemuck::{bytes_of, cast_slice};
-use offtrack::gpu::{Kernels, Slice};
+use offtrack::gpu::{Device, Kernels, Slice};
 use offtrack::layout::Column;
-use wgpu::{BindGroup, Device};
+use wgpu::BindGroup;
 
 use super::DeviceRollout;
-use super::memory_kernels::{Binding, Kernel, Now, Value, add};
-use super::shared::{Shared, floats, integers};
+use super::memory_kernels::{Binding, Kernel, Now, Value};
 use crate::config::Config;
+use crate::device::Batch;
 use crate::error::Error;
 
 /// A buffer for every binding.
@@ -31,7 +31,7 @@ impl Buffers {
     /// A bind group of those that a kernel names, with the `other` buffer for one of them where one is given.
     pub(super) fn group(
         &self,
-        device: &Device,
+        device: &wgpu::Device,
         kernels: &Kernels<Kernel>,
         kernel: Kernel,
         other: Option<(Binding, &Slice)>,
@@ -45,30 +45,17 @@ impl Buffers {
 }
 
 impl<const N: usize> DeviceRollout<N> {
-    /// Submits kernels, one after the other, with another buffer for one binding where one is given.
-    pub(super) fn submit(&self, each: &[Kernel], other: Option<(Binding, &Slice)>) {
-        let device = &self.shared.gpu.device;
-        let mut encoder = device.create_command_encoder(&Default::default());
-        for &kernel in each {
-            let group = self.buffers.group(device, &self.kernels, kernel, other);
-            add(&self.kernels, &mut encoder, &group, kernel, &self.facts);
-        }
-        self.shared.gpu.queue.submit([encoder.finish()]);
-    }
-
     /// A buffer for every binding of the kernels.
     pub(super) fn make_buffers(&mut self) -> Result<Buffers, Error> {
-        let gpu = self.shared.gpu.clone();
+        let gpu = self.gpu.clone();
         let filled = |contents: &[u8]| gpu.filled("replay buffer", contents);
         let empty = |size: usize| gpu.empty("replay buffer", size as u64);
         let actions = match &self.mirror {
             Some(mirror) => mirror.images().1,
             None => (0..self.facts.n_actions).collect(),
         };
-        let (observation, action) = (floats(&self.sample.observation)?, integers(&self.sample.action)?);
-        let (reward, discount, next) =
-            (floats(&self.sample.reward)?, floats(&self.sample.discount)?, floats(&self.sample.next_observation)?);
-        let weight = floats(&self.sample.weight)?;
+        let Batch { observation, action, reward, discount, next_observation, weight } = self.sample.clone();
+        let of_trucks = |width: usize| empty(self.config.n_envs * width * 4);
         let held = (self.facts.n_slots * self.facts.n_envs) as usize;
         // What priorities alone need is small without them.
         let (ranked, n_blocks) = if self.has_priorities() { (held, self.facts.n_blocks as usize) } else { (1, 1) };
@@ -101,39 +88,35 @@ impl<const N: usize> DeviceRollout<N> {
             (Binding::held_action, empty(held * 4)),
             (Binding::held_reward, empty(held * 4)),
             (Binding::held_ended, empty(held * 4)),
-            // These two are others in every step and every update; before the first one any will do.
-            (Binding::logits, empty(4)),
+            (Binding::seen, of_trucks(N)),
+            (Binding::logits, of_trucks(self.facts.n_actions as usize)),
+            // The learner's is bound once it has one.
             (Binding::td_error, empty(4)),
             (Binding::priority, empty(ranked * 4)),
             (Binding::block_sum, empty(n_blocks * 4)),
             (Binding::reached, empty(n_blocks * 4)),
             (Binding::largest, filled(bytes_of(&1.0f32))),
             (Binding::sampled_row, empty(self.facts.n_rows as usize * 4)),
-            (Binding::sampled_weight, weight.slice.clone()),
-            (Binding::sampled_observation, observation.slice.clone()),
-            (Binding::sampled_action, action.slice.clone()),
-            (Binding::sampled_reward, reward.slice.clone()),
-            (Binding::sampled_discount, discount.slice.clone()),
-            (Binding::sampled_next, next.slice.clone()),
+            (Binding::sampled_weight, weight),
+            (Binding::sampled_observation, observation),
+            (Binding::sampled_action, action),
+            (Binding::sampled_reward, reward),
+            (Binding::sampled_discount, discount),
+            (Binding::sampled_next, next_observation),
         ]);
-        self._owned.extend([observation, action, reward, discount, next, weight]);
         Ok(buffers)
     }
 }
 
 /// The observations must fit into one buffer of the device.
-pub(super) fn check_capacity<const N: usize>(
-    shared: &Shared,
-    config: &Config,
-    n_transitions: usize,
-) -> Result<(), Error> {
+pub(super) fn check_capacity<const N: usize>(gpu: &Device, config: &Config, n_transitions: usize) -> Result<(), Error> {
     let row_bytes = (N * size_of::<f32>()) as u64;
-    let limit = shared.gpu.device.limits().max_storage_buffer_binding_size.min(u64::from(u32::MAX) * 4);
+    let limit = gpu.device.limits().max_storage_buffer_binding_size.min(u64::from(u32::MAX) * 4);
     let needed = n_transitions as u64 * row_bytes;
     if needed <= limit {
         return Ok(());
     }
-    let (name, most) = (shared.gpu.name(), limit / row_bytes);
+    let (name, most) = (gpu.name(), limit / row_bytes);
     let expected =
         format!("its observations take {needed} bytes where {name} allows {limit} in a buffer: at most {most}");
     Err(Error::setting("replay_buffer.capacity", config.replay_buffer.capacity.to_string(), expected))

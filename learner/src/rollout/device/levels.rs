@@ -15,7 +15,7 @@ impl<const N: usize> DeviceRollout<N> {
             return Ok(());
         }
         let counts = std::slice::from_ref(self.buffers.slice(Binding::route_ends));
-        let bytes = self.shared.gpu.read(counts).map_err(offtrack::simulator::Error::from)?;
+        let bytes = self.gpu.read(counts).map_err(offtrack::simulator::Error::from)?;
         let counts: Vec<u32> = bytes[0].chunks_exact(4).map(bytemuck::pod_read_unaligned).collect();
         let n_ends = Ended::ALL.len();
         let routes = counts.chunks_exact(n_ends).zip(self.counted_ends.chunks_exact(n_ends));

@@ -135,6 +135,7 @@ bindings! {
     held_ended: "u32".to_owned(), false, "The ring: end codes, [n_slots, n_envs].";
     driven: "u32".to_owned(), false, "Routes of the step in hand, [n_envs].";
     route_ends: "atomic<u32>".to_owned(), false, "Episodes that ended, by route and end code, [n_routes, N_ENDS].";
+    seen: "f32".to_owned(), false, "What the actor sees, normalised, [n_envs, n_values].";
     logits: "f32".to_owned(), false, "The actor's output, [n_envs, n_actions].";
     sampled_row: "u32".to_owned(), false, "A sample: where in the ring its transitions begin, [n_rows].";
     sampled_weight: "f32".to_owned(), false, "A sample: importance-sampling weights, [n_rows].";
@@ -151,8 +152,7 @@ bindings! {
 }
 
 impl Binding {
-    /// What the kernels may do. A tensor's buffer is a slice of a page that other tensors use too, and a page is bound
-    /// either to be read or to be written, so all but the uniforms may be written.
+    /// What the kernels may do.
     fn access(self) -> Access {
         if matches!(self, Binding::facts | Binding::now) { Access::Uniform } else { Access::ReadWrite }
     }
@@ -161,6 +161,8 @@ impl Binding {
 offtrack::named! {
     /// The kernels' entry points.
     pub enum Kernel {
+        /// Normalises what the actor sees.
+        Look = "look",
         /// Samples an action for every truck from the actor's output.
         Choose = "choose",
         /// Stores observations and actions before a step.
@@ -195,6 +197,7 @@ impl Kernel {
     pub(super) fn bindings(self) -> &'static [Binding] {
         use Binding::*;
         match self {
+            Kernel::Look => &[facts, values, observation, extras, around, seen],
             Kernel::Choose => &[facts, now, action, logits],
             Kernel::StoreBefore => {
                 &[facts, now, action, truck, observation, extras, around, held_observation, held_action, driven]
@@ -250,7 +253,7 @@ impl Kernel {
         let (envs, rows, values) = (u64::from(facts.n_envs), u64::from(facts.n_rows), u64::from(facts.n_values));
         match self {
             Kernel::Choose | Kernel::CountEnds | Kernel::Admit => envs,
-            Kernel::StoreBefore | Kernel::StoreAfter => envs * values,
+            Kernel::Look | Kernel::StoreBefore | Kernel::StoreAfter => envs * values,
             Kernel::SumBlocks => facts.n_blocks.into(),
             Kernel::AddUp | Kernel::Weigh => WORKGROUP.into(),
             Kernel::Pick | Kernel::PickByPriority | Kernel::SetPriorities => rows,

@@ -1,18 +1,15 @@
 use super::*;
+use crate::device::least;
+use crate::network::Mlp;
 use crate::rollout::host::observed;
 use offtrack::layout::random::{index_below, signed_unit, words};
-use offtrack::layout::{Ended, ObservedExtras};
+use offtrack::layout::{Ended, N_AROUND, ObservedExtras};
 use offtrack::scenario::{Scenario, Split};
-use offtrack_policy::Policy;
+use offtrack_policy::{Layer, Policy};
 use std::path::Path;
 
 mod level_replay;
 mod priorities;
-
-/// The simulator's tests have it too.
-#[cfg(target_os = "linux")]
-#[path = "../../../../tests/simulator/machine_code/null_device.rs"]
-mod null_device;
 
 const MASS: usize = N_VALUES + ObservedExtras::Mass.n_extras();
 
@@ -53,13 +50,21 @@ struct Step<const N: usize> {
     next: [f32; N],
 }
 
-fn host<const D: usize>(tensor: &Tensor<D>) -> Vec<f32> {
-    tensor.clone().into_data().try_to_vec().unwrap()
+/// The numbers of a buffer.
+fn host<const N: usize>(rollout: &DeviceRollout<N>, slice: &Slice) -> Vec<f32> {
+    crate::device::numbers(&rollout.gpu, slice).unwrap()
+}
+
+/// An actor with the same output whatever it sees.
+fn constant(gpu: &Device, logits: Vec<f32>) -> Network {
+    let n_actions = logits.len();
+    let layer = Layer { weights: vec![0.0; N_VALUES * n_actions], biases: logits };
+    Network::of(gpu, &Mlp::of(&[layer], &burn::tensor::Device::flex()))
 }
 
 /// A buffer of the replay buffer, read.
-fn held<T: bytemuck::AnyBitPattern>(rollout: &DeviceRollout<N_VALUES>, binding: Binding) -> Vec<T> {
-    let bytes = rollout.shared.gpu.read(std::slice::from_ref(rollout.buffers.slice(binding))).unwrap();
+fn held<T: bytemuck::AnyBitPattern, const N: usize>(rollout: &DeviceRollout<N>, binding: Binding) -> Vec<T> {
+    let bytes = rollout.gpu.read(std::slice::from_ref(rollout.buffers.slice(binding))).unwrap();
     bytes[0].chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned).collect()
 }
 
@@ -85,11 +90,11 @@ fn networks_act_by_the_values_the_first_extras_and_then_the_vehicles() {
     scenario.keep(&[Split::Test]);
     scenario.extras = ObservedExtras::Mass;
     let (world, routes) = (Arc::new(World::bake(&scenario).unwrap()), scenario.split(Split::Test).to_vec());
-    let mut rollout =
-        DeviceRollout::<BOTH>::new(&Shared::least().unwrap(), &config(&[]), &world, routes, None).unwrap();
+    let mut rollout = DeviceRollout::<BOTH>::new(&least(), &config(&[]), &world, routes, None).unwrap();
     rollout.step_at_random().unwrap();
     rollout.wait().unwrap();
-    let acted_by = host(&rollout.normalised());
+    rollout.submit(&[Kernel::Look]);
+    let acted_by = host(&rollout, rollout.buffers.slice(Binding::seen));
     let batch = rollout.simulator().batch();
     let seen = observed::<BOTH>(&batch.observation, &batch.extras, &batch.around);
     let clipped: Vec<f32> = seen.iter().flatten().map(|value| value.clamp(-LIMIT, LIMIT)).collect();
@@ -100,7 +105,7 @@ fn networks_act_by_the_values_the_first_extras_and_then_the_vehicles() {
 /// Compares samples of a benchmark whose networks observe `N` values with the steps that were made.
 fn check_samples<const N: usize>(benchmark: &str) {
     let (world, routes) = training_of(benchmark);
-    let shared = Shared::least().unwrap();
+    let gpu = least();
     let mirror = Mirror::of(&world).unwrap();
     for settings in [
         ["learning.mirror_augmentation=true", "learning.observation_noise=0.2"],
@@ -108,15 +113,9 @@ fn check_samples<const N: usize>(benchmark: &str) {
     ] {
         let config = config(&settings);
         let (n_envs, n_steps, seeds) = (config.n_envs, config.learning.n_steps, [7, 8]);
-        let mut rollout = DeviceRollout::<N>::with_seeds(
-            &shared,
-            &config,
-            &world,
-            routes.clone(),
-            mirror_of(&config, &mirror),
-            seeds,
-        )
-        .unwrap();
+        let mut rollout =
+            DeviceRollout::<N>::with_seeds(&gpu, &config, &world, routes.clone(), mirror_of(&config, &mirror), seeds)
+                .unwrap();
         let mut history: Vec<Vec<Step<N>>> = Vec::new();
         // Three times round the ring of 32 steps.
         for _ in 0..100 {
@@ -140,10 +139,10 @@ fn check_samples<const N: usize>(benchmark: &str) {
         let normalisation =
             Normalisation { mean: vec![0.25; N], factor: (0..N).map(|index| 1.0 + index as f32).collect() };
         rollout.set_normalisation(&normalisation);
-        let sample = rollout.sample().unwrap().remove(0);
-        let (observation, next) = (host(&sample.observation), host(&sample.next_observation));
-        let (reward, discount) = (host(&sample.reward), host(&sample.discount));
-        let action: Vec<i32> = sample.action.clone().into_data().try_to_vec().unwrap();
+        let sample = rollout.sample().unwrap().on_device().unwrap();
+        let (observation, next) = (host(&rollout, &sample.observation), host(&rollout, &sample.next_observation));
+        let (reward, discount) = (host(&rollout, &sample.reward), host(&rollout, &sample.discount));
+        let action: Vec<i32> = held(&rollout, Binding::sampled_action);
         let n_slots = config.replay_buffer.capacity.div_ceil(n_envs);
         let (mut ends, mut mirrored) = (0, 0);
         for row in 0..config.learning.batch {
@@ -197,13 +196,13 @@ fn check_samples<const N: usize>(benchmark: &str) {
 #[test]
 fn the_replay_buffer_has_the_simulators_rewards_and_more_for_an_arrival_where_that_is_asked_for() {
     let (world, routes) = training();
-    let shared = Shared::least().unwrap();
+    let gpu = least();
     let policy = Policy::shipped("attard2023").unwrap();
-    let actor = Mlp::of(&policy.layers, &shared.tensors);
+    let actor = Actor::Device(Network::of(&gpu, &Mlp::of_policy(&policy)));
     for (setting, arrival) in [("seed=0", 0.0), ("learning.arrival=1500", 1500.0)] {
         let config = config(&["n_envs=16", "replay_buffer.capacity=4000", setting]);
         let mut rollout =
-            DeviceRollout::<N_VALUES>::with_seeds(&shared, &config, &world, routes.clone(), None, [7, 8]).unwrap();
+            DeviceRollout::<N_VALUES>::with_seeds(&gpu, &config, &world, routes.clone(), None, [7, 8]).unwrap();
         rollout.set_normalisation(&policy.normalisation);
         let (mut expected, mut arrivals) = (Vec::new(), 0);
         for _ in 0..250 {
@@ -215,7 +214,7 @@ fn the_replay_buffer_has_the_simulators_rewards_and_more_for_an_arrival_where_th
                 if arrived { reward + arrival } else { reward }
             }));
         }
-        assert_eq!(held::<f32>(&rollout, Binding::held_reward), expected);
+        assert_eq!(held::<f32, N_VALUES>(&rollout, Binding::held_reward), expected);
         assert!(0 < arrivals, "no truck arrived");
     }
 }
@@ -223,15 +222,14 @@ fn the_replay_buffer_has_the_simulators_rewards_and_more_for_an_arrival_where_th
 #[test]
 fn actions_follow_the_actors_distribution() {
     let (world, routes) = training();
-    let shared = Shared::least().unwrap();
+    let gpu = least();
     let config = config(&["n_envs=4096", "replay_buffer.capacity=100000"]);
-    let mut rollout = DeviceRollout::<N_VALUES>::with_seeds(&shared, &config, &world, routes, None, [7, 8]).unwrap();
+    let mut rollout = DeviceRollout::<N_VALUES>::with_seeds(&gpu, &config, &world, routes, None, [7, 8]).unwrap();
     // Probabilities of 1/45, 2/45, ... 9/45.
-    let logits: Vec<f32> = (0..4096).flat_map(|_| (1..=9).map(|rank| (rank as f32).ln())).collect();
-    let logits = Tensor::from_data(TensorData::new(logits, [4096, 9]), &shared.tensors);
+    let actor = constant(&gpu, (1..=9).map(|rank| (rank as f32).ln()).collect());
     let mut counts = [0usize; 9];
     for _ in 0..5 {
-        rollout.step_by(Some(&logits), true).unwrap();
+        rollout.step_by(Some(&actor), true).unwrap();
         rollout.simulator().batch().action.iter().for_each(|&action| counts[action as usize] += 1);
     }
     let n = 5.0 * 4096.0;
@@ -245,48 +243,12 @@ fn actions_follow_the_actors_distribution() {
     }
 }
 
-/// Rewards of 40 samples, each requested before the next sample is drawn and computed when the device gets to it.
-fn rewards(skips_flush: bool) -> Vec<Vec<f32>> {
-    let (world, routes) = training();
-    let mut shared = Shared::least().unwrap();
-    shared.skips_flush = skips_flush;
-    let mut rollout = DeviceRollout::<N_VALUES>::with_seeds(
-        &shared,
-        &config(&["learning.mirror_augmentation=false"]),
-        &world,
-        routes,
-        None,
-        [7, 8],
-    )
-    .unwrap();
-    for _ in 0..40 {
-        rollout.step_at_random().unwrap();
-    }
-    shared.tensors.sync().unwrap();
-    let mut request = |_| {
-        let requested = rollout.sample().unwrap().remove(0).reward.mul_scalar(1.0);
-        rollout.sample().unwrap();
-        host(&requested)
-    };
-    (0..40).map(&mut request).collect()
-}
-
-#[test]
-fn a_sample_is_read_before_the_next_one_overwrites_it_and_only_because_of_the_flush() {
-    let expected = rewards(false);
-    assert_eq!(expected, rewards(false));
-    let unflushed = rewards(true);
-    let wrong = expected.iter().zip(&unflushed).filter(|(expected, found)| expected != found).count();
-    println!("{wrong} of 40 results are of the wrong sample without the flush");
-    assert!(20 < wrong, "the flush could be left out");
-}
-
 #[test]
 fn trucks_take_the_actions_of_the_latest_output() {
     let (world, routes) = training();
-    let shared = Shared::least().unwrap();
+    let gpu = least();
     let mut rollout = DeviceRollout::<N_VALUES>::with_seeds(
-        &shared,
+        &gpu,
         &config(&["learning.mirror_augmentation=false"]),
         &world,
         routes,
@@ -294,14 +256,9 @@ fn trucks_take_the_actions_of_the_latest_output() {
         [7, 8],
     )
     .unwrap();
-    let output = |step: usize| {
-        let row = (0..9).map(|action| if action == step % 9 { 50.0 } else { 0.0 });
-        Tensor::<2>::from_data(TensorData::new(row.collect::<Vec<f32>>(), [1, 9]), &shared.tensors).repeat_dim(0, 64)
-    };
     for step in 0..40 {
-        // An output that has to be computed first.
-        let logits = output(step).mul_scalar(2.0).add_scalar(1.0);
-        rollout.step_by(Some(&logits), true).unwrap();
+        let actor = constant(&gpu, (0..9).map(|action| if action == step % 9 { 50.0 } else { 0.0 }).collect());
+        rollout.step_by(Some(&actor), true).unwrap();
         assert!(rollout.simulator().batch().action.iter().all(|&action| action as usize == step % 9), "{step}");
     }
 }
@@ -309,8 +266,9 @@ fn trucks_take_the_actions_of_the_latest_output() {
 #[cfg(target_os = "linux")]
 #[test]
 fn no_kernel_of_the_replay_buffer_spills_or_takes_more_registers_and_memory_of_a_card_than_stated() {
-    use null_device::{Stated, check, stated};
+    use crate::device::null_device::{Stated, check, stated};
     let most: [Stated; Kernel::ALL.len()] = [
+        stated("look", 48, 0, 0),
         stated("choose", 48, 0, 0),
         stated("store_before", 48, 0, 0),
         stated("store_after", 48, 0, 0),

@@ -37,7 +37,7 @@ fn the_replay_buffer_has_the_simulators_rewards_and_more_for_an_arrival_where_th
         let (mut rollout, actor) = rollout(&settings);
         let mut expected = Vec::new();
         for _ in 0..N_STEPS {
-            rollout.step(&actor, 0).unwrap();
+            rollout.step(&Actor::Host(actor.clone()), 0).unwrap();
             let batch = rollout.simulator().batch();
             expected.extend(batch.reward.iter().zip(&batch.ended).map(|(&reward, &code)| {
                 let arrived = code == Ended::Arrived as u32;
@@ -237,7 +237,7 @@ fn under_a_rule_the_replay_buffer_has_the_actions_that_were_made_by_chance_too()
     let (mut made, mut n_slow) = (Vec::new(), 0);
     for step in 0..100 {
         let allowed = allowed(&rollout);
-        if step < 50 { rollout.step_at_random() } else { rollout.step(&actor, 0) }.unwrap();
+        if step < 50 { rollout.step_at_random() } else { rollout.step(&Actor::Host(actor.clone()), 0) }.unwrap();
         let batch = rollout.simulator.batch();
         for (&action, allowed) in batch.action.iter().zip(allowed) {
             assert!(rollout.simulator.world().actions[action as usize].speed <= allowed);

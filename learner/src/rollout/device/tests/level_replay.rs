@@ -6,8 +6,8 @@ use super::*;
 fn routes_are_drawn_anew_by_the_episodes_that_ended_on_them_and_so_after_a_checkpoint() {
     let (world, routes) = training();
     let config = config(&["level_replay.fraction=0.5", "level_replay.rate=0.2"]);
-    let shared = Shared::least().unwrap();
-    let new = || DeviceRollout::<N_VALUES>::with_seeds(&shared, &config, &world, routes.clone(), None, [7, 8]).unwrap();
+    let gpu = least();
+    let new = || DeviceRollout::<N_VALUES>::with_seeds(&gpu, &config, &world, routes.clone(), None, [7, 8]).unwrap();
     let list = |rollout: &DeviceRollout<N_VALUES>| rollout.simulator().batch().choice().routes().to_vec();
     let mut rollout = new();
     let mut replay = LevelReplay::new(config.level_replay.unwrap(), routes.clone());

@@ -7,8 +7,8 @@ fn rollout(exponent: f64, n_steps: usize, settings: &[&str]) -> DeviceRollout<N_
     let (world, routes) = training();
     let exponent = format!("replay_buffer.priority.exponent={exponent}");
     let settings = [&[exponent.as_str(), "replay_buffer.priority.correction=0.4"], settings].concat();
-    let shared = Shared::least().unwrap();
-    let mut rollout = DeviceRollout::with_seeds(&shared, &config(&settings), &world, routes, None, [7, 8]).unwrap();
+    let gpu = least();
+    let mut rollout = DeviceRollout::with_seeds(&gpu, &config(&settings), &world, routes, None, [7, 8]).unwrap();
     (0..n_steps).for_each(|_| rollout.step_at_random().unwrap());
     rollout
 }
@@ -16,13 +16,13 @@ fn rollout(exponent: f64, n_steps: usize, settings: &[&str]) -> DeviceRollout<N_
 /// The rows of a new sample.
 fn sampled(rollout: &mut DeviceRollout<N_VALUES>) -> Vec<usize> {
     rollout.sample().unwrap();
-    held::<u32>(rollout, Binding::sampled_row).into_iter().map(|row| row as usize).collect()
+    held::<u32, N_VALUES>(rollout, Binding::sampled_row).into_iter().map(|row| row as usize).collect()
 }
 
 /// Sets the TD errors of the latest sample.
 fn set_errors(rollout: &mut DeviceRollout<N_VALUES>, errors: &[f32]) {
-    let errors = TensorData::new(errors.to_vec(), [errors.len(), 1]);
-    rollout.set_td_errors(vec![Tensor::from_data(errors, &rollout.shared.tensors)]).unwrap();
+    let errors = rollout.gpu.filled("errors", cast_slice(errors));
+    rollout.set_td_errors(TdErrors::Device(errors)).unwrap();
 }
 
 /// TD errors of 0 to 50, most of them small.
@@ -54,7 +54,7 @@ fn priorities_and_weights_are_those_of_the_host_round_the_ring() {
         let least = drawn.iter().map(|&row| expected[row]).fold(f64::MAX, f64::min);
         assert!(0.0 < least, "step {step}: what cannot be sampled was");
         // The device's power has a few of the 24 bits of an f32 less than the host's.
-        for (&row, weight) in drawn.iter().zip(host(&rollout.sample.weight)) {
+        for (&row, weight) in drawn.iter().zip(host(&rollout, &rollout.sample.weight)) {
             let expected = (least / expected[row]).powf(correction);
             assert!((f64::from(weight) - expected).abs() < 1e-4, "step {step}: {weight} {expected}");
         }
@@ -66,11 +66,11 @@ fn priorities_and_weights_are_those_of_the_host_round_the_ring() {
             expected[row] = (f64::from(error) + 1e-6).powf(exponent);
             largest = largest.max(expected[row]);
         }
-        let found = held::<f32>(&rollout, Binding::priority);
+        let found = held::<f32, N_VALUES>(&rollout, Binding::priority);
         for (row, (&found, expected)) in found.iter().zip(&mut expected).enumerate() {
             assert!((f64::from(found) - *expected).abs() <= 1e-4 * *expected, "step {step}, {row}: {found} {expected}");
         }
-        assert!((f64::from(held::<f32>(&rollout, Binding::largest)[0]) - largest).abs() < 1e-4 * largest);
+        assert!((f64::from(held::<f32, N_VALUES>(&rollout, Binding::largest)[0]) - largest).abs() < 1e-4 * largest);
     }
 }
 
@@ -106,15 +106,14 @@ fn transitions_are_sampled_in_proportion_to_their_priorities_which_uniform_sampl
         let errors: Vec<f32> = sampled(&mut rollout).iter().map(|row| [0.0, 1.0, 4.0, 9.0, 16.0][row % 5]).collect();
         set_errors(&mut rollout, &errors);
     }
-    let priorities = held::<f32>(&rollout, Binding::priority);
+    let priorities = held::<f32, N_VALUES>(&rollout, Binding::priority);
     let n_rare = priorities.iter().filter(|&&priority| 0.0 < priority && priority < 0.01).count();
     assert!(1000 < n_rare, "{n_rare}");
     let (departs, rare) = departure(&mut rollout, &priorities);
     // 400,000 draws; the rows of error 0 have the root of 1e-6 as their priority, all together 1e-4 of the sum.
     assert!(departs < 5.0 && rare < 100.0, "{departs} {rare}");
     let (world, routes) = training();
-    let mut uniform =
-        DeviceRollout::with_seeds(&rollout.shared, &config(&sizes), &world, routes, None, [7, 8]).unwrap();
+    let mut uniform = DeviceRollout::with_seeds(&rollout.gpu, &config(&sizes), &world, routes, None, [7, 8]).unwrap();
     (0..40).for_each(|_| uniform.step_at_random().unwrap());
     let (departs, rare) = departure(&mut uniform, &priorities);
     assert!(100.0 < departs && 1000.0 < rare, "{departs} {rare}");
@@ -128,10 +127,10 @@ fn the_same_seed_gives_the_same_samples_and_priorities_to_the_bit() {
             .map(|step| {
                 let drawn = sampled(&mut rollout);
                 set_errors(&mut rollout, &errors(drawn.len(), step));
-                (drawn, host(&rollout.sample.weight))
+                (drawn, host(&rollout, &rollout.sample.weight))
             })
             .collect();
-        (samples, held::<u32>(&rollout, Binding::priority))
+        (samples, held::<u32, N_VALUES>(&rollout, Binding::priority))
     };
     assert!(run() == run());
 }
@@ -139,9 +138,9 @@ fn the_same_seed_gives_the_same_samples_and_priorities_to_the_bit() {
 #[test]
 fn a_td_error_that_is_not_finite_changes_no_priority() {
     let mut rollout = rollout(0.6, 20, &[]);
-    let before = held::<u32>(&rollout, Binding::priority);
+    let before = held::<u32, N_VALUES>(&rollout, Binding::priority);
     let n_rows = sampled(&mut rollout).len();
     set_errors(&mut rollout, &vec![f32::INFINITY; n_rows]);
     set_errors(&mut rollout, &vec![f32::NAN; n_rows]);
-    assert!(held::<u32>(&rollout, Binding::priority) == before);
+    assert!(held::<u32, N_VALUES>(&rollout, Binding::priority) == before);
 }
