@@ -116,7 +116,8 @@ scale random-one-a-submission 30 "$fewer" --submission 1
 [[ $modes == *training* ]] && config=(--config "$training")
 scale networks 80 "$fewer" --mode "$modes" "${config[@]}"
 scale many-roads 60 "$fewer" --benchmark "$many"
-part training 100 "$offtrack" train "$training" "${adapter[@]}" --minutes "$minutes" --out "$out" --name training "${options[@]}"
+# As many steps as the time allows.
+part training 100 "$offtrack" train "$training" "${adapter[@]}" --minutes "$minutes" --steps 1000000000000 --out "$out" --name training "${options[@]}"
 [ -n "$smi" ] && kill "$smi"
 part joined 20 python3 benches/on_a_gpu.py "$out"
 

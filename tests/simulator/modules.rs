@@ -122,8 +122,8 @@ fn the_feature_gpu_is_named_only_where_an_engine_or_device_is_chosen() {
                 ("replay_buffer.rs", 1),
                 ("rollout.rs", 1),
                 ("run/lost_device_tests.rs", 1),
-                ("sac.rs", 1),
                 ("sac/device_tests.rs", 1),
+                ("sac.rs", 1),
             ],
         ),
         // The list of devices, and the default training file.

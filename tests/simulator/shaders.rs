@@ -68,7 +68,7 @@ fn shaders() -> Vec<(String, String)> {
             }
         }
     }
-    assert_eq!(shaders.len(), SHADERS.len() + 5);
+    assert_eq!(shaders.len(), SHADERS.len() + 7);
     shaders
 }
 

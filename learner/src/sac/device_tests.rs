@@ -164,6 +164,30 @@ fn a_learner_restored_on_a_device_has_the_numbers_of_the_host() {
     assert_ne!(host.actor.parameters(), host.actor_ema().parameters());
 }
 
+#[test]
+fn a_sample_of_another_memory_is_refused() {
+    let gpu = device::least();
+    let mut host = Sac::new(&learning(), 6, 4, 3).unwrap();
+    let mut on_device = DeviceSac::new(&gpu, &learning(), 6, 4, 3).unwrap();
+    let [here, there] = random_batch(0, &gpu);
+    for refused in [host.update(there, 1.0).err(), on_device.update(here, 1.0).err()] {
+        assert!(refused.unwrap().to_string().contains("the sample must be where the trucks and the learner are"));
+    }
+}
+
+#[test]
+fn a_batch_that_does_not_fit_into_a_buffer_is_refused_with_what_would() {
+    let gpu = device::least();
+    for (batch, hidden) in [(1 << 20, vec![8192, 8]), (20_000, vec![512])] {
+        let learning = Learning { batch, hidden, ..learning() };
+        let refused = DeviceSac::new(&gpu, &learning, 6, 4, 3).err().unwrap().to_string();
+        for part in [format!("learning.batch: {batch}; "), gpu.name(), "a smaller batch, or smaller layers".to_owned()]
+        {
+            assert!(refused.contains(&part), "{refused}");
+        }
+    }
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn no_kernel_of_the_learner_spills_or_takes_more_registers_and_memory_of_a_card_than_stated() {

@@ -134,7 +134,10 @@ impl Plan {
             output_errors,
         };
         let shape = Shape { facts, layers, hidden };
-        Plan { facts, length: places.0 as usize, dispatches: shape.dispatches() }
+        // Places would not be numbers of 32 bits.
+        let is_too_long = places.0 == u32::MAX;
+        let dispatches = if is_too_long { Vec::new() } else { shape.dispatches() };
+        Plan { facts, length: places.0 as usize, dispatches }
     }
 }
 
