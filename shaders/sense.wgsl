@@ -6,41 +6,29 @@
 // A ray takes 2 to 40 samples, and threads that step together wait for the longest one. So a workgroup shares the rays
 // of a team of trucks: a thread whose ray has ended takes the next one that waits.
 
-// Rays of the largest team.
-const TEAM_RAYS: u32 = TEAM_MAX * N_RAYS;
-
-// Position and direction of each unit of the team's trucks, as they are observed: trailer, tractor.
+// The trucks of the team that are sensed, and how many they are.
+var<workgroup> sensed_trucks: array<u32, TEAM_MAX>;
+var<workgroup> n_sensed: atomic<u32>;
+// Position and direction of each of their units, as they are observed: trailer, tractor; vehicles and fields.
 var<workgroup> unit_poses: array<vec4<f32>, 2u * TEAM_MAX>;
-// Whether each truck is sensed, its vehicle and its field.
-var<workgroup> is_sensed: array<u32, TEAM_MAX>;
 var<workgroup> team_vehicles: array<u32, TEAM_MAX>;
 var<workgroup> team_fields: array<FieldRow, TEAM_MAX>;
-// Rays that have been taken, and what was found on each.
+// Rays that have been taken.
 var<workgroup> n_taken: atomic<u32>;
-var<workgroup> found: array<f32, TEAM_RAYS>;
 
 @compute @workgroup_size(WORKGROUP)
 fn sense(thread: Thread) {
-    let first = first_of_team(thread);
-    let env = first + thread.local;
+    let env = first_of_team(thread) + thread.local;
     place(thread.local, thread.local < batch.team && is_driving(env), env);
-    trace_all(thread.local);
-    for (var n = thread.local; n < batch.team * N_RAYS; n += WORKGROUP) {
-        let whose = first + n / N_RAYS;
-        if is_sensed[n / N_RAYS] == 1u { ranges[first * N_RAYS + n] = read_off(whose, n, truck[whose].steps + 1u); }
-    }
+    trace_all(1u);
 }
 
 // The same for the trucks that began another episode.
 @compute @workgroup_size(WORKGROUP)
 fn sense_after_reset(thread: Thread) {
-    let first = first_of_team(thread);
-    let env = first + thread.local;
+    let env = first_of_team(thread) + thread.local;
     place(thread.local, thread.local < batch.team && has_begun(env), env);
-    trace_all(thread.local);
-    for (var n = thread.local; n < batch.team * N_RAYS; n += WORKGROUP) {
-        if is_sensed[n / N_RAYS] == 1u { ranges[first * N_RAYS + n] = read_off(first + n / N_RAYS, n, 0u); }
-    }
+    trace_all(0u);
 }
 
 // The first truck of the workgroup's team.
@@ -48,33 +36,39 @@ fn first_of_team(thread: Thread) -> u32 {
     return (thread.group.y * thread.groups.x + thread.group.x) * batch.team;
 }
 
-// Places a truck's units, one truck a thread.
+// Lists the trucks that are sensed and places their units, one truck a thread.
 fn place(local: u32, sensed: bool, env: u32) {
-    if local == 0u { atomicStore(&n_taken, 0u); }
-    if local < batch.team { is_sensed[local] = select(0u, 1u, sensed); }
+    if local == 0u {
+        atomicStore(&n_sensed, 0u);
+        atomicStore(&n_taken, 0u);
+    }
+    workgroupBarrier();
     if sensed {
+        let at = atomicAdd(&n_sensed, 1u);
         var truck = truck[env];
         if disturbances.of_observation == 1u { truck = seen_truck(truck, poses[env * N_POSES]); }
         let trailer = trailer_position(vehicles[truck.vehicle].rig, truck);
-        unit_poses[2u * local] = vec4<f32>(trailer, direction(truck.trailer_heading));
-        unit_poses[2u * local + 1u] = vec4<f32>(truck.position, direction(truck.heading));
-        team_vehicles[local] = truck.vehicle;
-        team_fields[local] = field_at(truck.route);
+        sensed_trucks[at] = env;
+        unit_poses[2u * at] = vec4<f32>(trailer, direction(truck.trailer_heading));
+        unit_poses[2u * at + 1u] = vec4<f32>(truck.position, direction(truck.heading));
+        team_vehicles[at] = truck.vehicle;
+        team_fields[at] = field_at(truck.route);
     }
     workgroupBarrier();
 }
 
-// What the sensor of ray `n` of the team, of truck `env`, reads `steps` steps after the start of the episode (m).
-fn read_off(env: u32, n: u32, steps: u32) -> f32 {
-    if disturbances.of_observation == 0u { return found[n]; }
+// What the sensor of ray `n` of truck `env` reads at a distance to the kerb (m), `ahead_by` steps after those that the
+// truck has counted.
+fn read_off(env: u32, n: u32, distance: f32, ahead_by: u32) -> f32 {
+    if disturbances.of_observation == 0u { return distance; }
     let key = noise_key(streams[env], truck[env].episode);
-    return reading(disturbances, key, steps, params.sensor_range, n % N_RAYS, found[n]);
+    return reading(disturbances, key, truck[env].steps + ahead_by, params.sensor_range, n, distance);
 }
 
 // Distance along every ray of the team to the kerb: the sensors' range where none is met before, 0 from inside one (m).
 // Within 2 cm of the exact distance, except for rays that come within 2 cm of a kerb at less than 5 deg to it.
-fn trace_all(local: u32) {
-    let n_rays = batch.team * N_RAYS;
+fn trace_all(ahead_by: u32) {
+    let n_rays = atomicLoad(&n_sensed) * N_RAYS;
     let reach = params.sensor_range;
     var ray = n_rays;
     var field = FieldRow();
@@ -91,10 +85,6 @@ fn trace_all(local: u32) {
             ray = atomicAdd(&n_taken, 1u);
             if n_rays <= ray { break; }
             let whose = ray / N_RAYS;
-            if is_sensed[whose] == 0u {
-                ray = n_rays;
-                continue;
-            }
             let mount = vehicles[team_vehicles[whose]].rays[ray % N_RAYS];
             let pose = unit_poses[2u * whose + select(1u, 0u, ray % N_RAYS < N_TRAILER_RAYS)];
             field = team_fields[whose];
@@ -131,9 +121,9 @@ fn trace_all(local: u32) {
         along = next;
         n_samples++;
         if met || beyond || inside || n_samples == SAMPLES_MAX {
-            found[ray] = along;
+            let env = sensed_trucks[ray / N_RAYS];
+            ranges[env * N_RAYS + ray % N_RAYS] = read_off(env, ray % N_RAYS, along, ahead_by);
             ray = n_rays;
         }
     }
-    workgroupBarrier();
 }
