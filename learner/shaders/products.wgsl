@@ -72,43 +72,25 @@ fn multiply(
 
 // Four rows of the left matrix at an inner index; 0 outside.
 fn read_left(product: Product, row: u32, inner: u32) -> vec4<f32> {
-    var found = vec4<f32>();
-    if inner < product.n_inner {
-        let at = product.left + row * product.left_row + inner * product.left_inner;
-        if row + 3u < product.n_rows {
-            found = vec4<f32>(
-                memory[at],
-                memory[at + product.left_row],
-                memory[at + 2u * product.left_row],
-                memory[at + 3u * product.left_row],
-            );
-        } else {
-            if row < product.n_rows { found.x = memory[at]; }
-            if row + 1u < product.n_rows { found.y = memory[at + product.left_row]; }
-            if row + 2u < product.n_rows { found.z = memory[at + 2u * product.left_row]; }
-        }
-    }
-    return found;
+    if product.n_inner <= inner { return vec4<f32>(); }
+    let at = product.left + row * product.left_row + inner * product.left_inner;
+    return four(at, product.left_row, product.n_rows - min(row, product.n_rows));
 }
 
 // Four columns of the right matrix at an inner index; 0 outside.
 fn read_right(product: Product, column: u32, inner: u32) -> vec4<f32> {
+    if product.n_inner <= inner { return vec4<f32>(); }
+    let at = product.right + inner * product.right_inner + column * product.right_column;
+    return four(at, product.right_column, product.n_columns - min(column, product.n_columns));
+}
+
+// Four numbers of which each stands `apart` from the one before; 0 where there are fewer.
+fn four(at: u32, apart: u32, n: u32) -> vec4<f32> {
+    if 4u <= n { return vec4<f32>(memory[at], memory[at + apart], memory[at + 2u * apart], memory[at + 3u * apart]); }
     var found = vec4<f32>();
-    if inner < product.n_inner {
-        let at = product.right + inner * product.right_inner + column * product.right_column;
-        if column + 3u < product.n_columns {
-            found = vec4<f32>(
-                memory[at],
-                memory[at + product.right_column],
-                memory[at + 2u * product.right_column],
-                memory[at + 3u * product.right_column],
-            );
-        } else {
-            if column < product.n_columns { found.x = memory[at]; }
-            if column + 1u < product.n_columns { found.y = memory[at + product.right_column]; }
-            if column + 2u < product.n_columns { found.z = memory[at + 2u * product.right_column]; }
-        }
-    }
+    if 0u < n { found.x = memory[at]; }
+    if 1u < n { found.y = memory[at + apart]; }
+    if 2u < n { found.z = memory[at + 2u * apart]; }
     return found;
 }
 

@@ -10,6 +10,8 @@ mod products;
 
 use bytemuck::cast_slice;
 use offtrack::gpu::{Device, Error, Slice};
+#[cfg(test)]
+use offtrack::layout::buffers::Access;
 
 use crate::network::Mlp;
 
@@ -70,6 +72,27 @@ impl Network {
 pub fn least() -> Device {
     let asked = |_: &wgpu::Adapter| (wgpu::Features::empty(), wgpu::Limits::default());
     Device::open_with(None, asked).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Each kernel, by its name, is bound to what it names in `source`, and to no more storage buffers than every device of
+/// WebGPU has.
+#[cfg(test)]
+pub(crate) fn assert_bound(source: &str, kernels: impl Iterator<Item = (&'static str, Vec<(u32, Access)>)>) {
+    use wgpu::naga::front::wgsl::parse_str;
+    use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
+    let module = parse_str(source).unwrap_or_else(|error| panic!("{}", error.emit_to_string(source)));
+    let info = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module).unwrap();
+    for (kernel, bindings) in kernels {
+        let index = module.entry_points.iter().position(|entry| entry.name == kernel).unwrap();
+        let used = info.get_entry_point(index);
+        let named = module.global_variables.iter().filter(|(handle, _)| !used[*handle].is_empty());
+        let mut named: Vec<u32> = named.filter_map(|(_, variable)| Some(variable.binding.as_ref()?.binding)).collect();
+        named.sort_unstable();
+        let declared: Vec<u32> = bindings.iter().map(|&(binding, _)| binding).collect();
+        assert_eq!(named, declared, "{kernel}");
+        let storage = bindings.iter().filter(|(_, access)| *access != Access::Uniform).count();
+        assert!(storage <= wgpu::Limits::default().max_storage_buffers_per_shader_stage as usize, "{kernel}");
+    }
 }
 
 /// The numbers of a buffer. Waits for the device.

@@ -3,7 +3,7 @@
 use crate::panics::unreadable;
 use burn::module::{Module, Param};
 use burn::nn::{LayerNorm, LayerNormConfig, Linear};
-use burn::tensor::activation::{log_softmax, relu};
+use burn::tensor::activation::relu;
 use burn::tensor::{Device, Tensor, TensorData};
 use rand::rngs::SmallRng;
 use rand::{Rng, SeedableRng};
@@ -147,12 +147,6 @@ fn vector(values: Vec<f32>, device: &Device) -> Param<Tensor<1>> {
 pub fn layer(weights: Vec<f32>, biases: Vec<f32>, device: &Device) -> Linear {
     let shape = [weights.len() / biases.len(), biases.len()];
     Linear { weight: Param::from_data(TensorData::new(weights, shape), device), bias: Some(vector(biases, device)) }
-}
-
-/// Probabilities and their logarithms, `[B, A]` each, of an actor's output `[B, A]`.
-pub fn distribution(logits: Tensor<2>) -> (Tensor<2>, Tensor<2>) {
-    let log_probs = log_softmax(logits, 1);
-    (log_probs.clone().exp(), log_probs)
 }
 
 /// An action sampled from the softmax of each row of `logits`, `(rows)`.

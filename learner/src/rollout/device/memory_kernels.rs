@@ -300,27 +300,14 @@ pub(super) fn add(
 
 #[cfg(test)]
 mod tests {
-    use wgpu::naga::front::wgsl;
-    use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
-
     use super::*;
 
     #[test]
     fn a_kernel_is_bound_to_what_its_shader_names_and_to_no_more_than_every_device_has() {
-        let source = source();
-        let module = wgsl::parse_str(&source).unwrap_or_else(|error| panic!("{}", error.emit_to_string(&source)));
-        let info = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module).unwrap();
-        for kernel in Kernel::ALL {
-            let index = module.entry_points.iter().position(|entry| entry.name == kernel.name()).unwrap();
-            let used = info.get_entry_point(index);
-            let named = module.global_variables.iter().filter(|(handle, _)| !used[*handle].is_empty());
-            let mut named: Vec<u32> =
-                named.filter_map(|(_, variable)| Some(variable.binding.as_ref()?.binding)).collect();
-            named.sort_unstable();
-            let declared: Vec<u32> = kernel.bindings().iter().map(|&binding| binding as u32).collect();
-            assert_eq!(named, declared, "{kernel:?}");
-            let storage = kernel.bindings().iter().filter(|binding| binding.access() != Access::Uniform).count();
-            assert!(storage <= wgpu::Limits::default().max_storage_buffers_per_shader_stage as usize, "{kernel:?}");
-        }
+        let bindings = |&kernel: &Kernel| {
+            let each = kernel.bindings().iter().map(|&binding| (binding as u32, binding.access()));
+            (kernel.name(), each.collect())
+        };
+        crate::device::assert_bound(&source(), Kernel::ALL.iter().map(bindings));
     }
 }

@@ -11,6 +11,7 @@ pub(super) const N_NETWORKS: usize = 2 * N_LEARNING;
 pub(super) const N_ENTROPY: usize = 3;
 /// Sums of figures.
 pub(super) const N_SUMS: usize = 4;
+
 /// A kernel, what it is bound to beside the facts, and its workgroups.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Dispatch {

@@ -1,7 +1,13 @@
 //! Gradients beside those of automatic differentiation.
 
 use super::*;
-use crate::network::distribution;
+use burn::tensor::activation::log_softmax;
+
+/// Probabilities and their logarithms, `[B, A]` each, of an actor's output `[B, A]`.
+fn distribution(logits: Tensor<2>) -> (Tensor<2>, Tensor<2>) {
+    let log_probs = log_softmax(logits, 1);
+    (log_probs.clone().exp(), log_probs)
+}
 
 /// The gradients of the first critic, the second and the actor that the tensor library finds by recording every
 /// operation.
