@@ -78,6 +78,7 @@ pub const FILES: &[(&str, &str)] = embedded![
     "transfer2026-held-out.toml",
     "transfer2026-random.toml",
     "transfer2026-refinement.toml",
+    "transfer2026-refinement-home.toml",
     "transfer2026-training.toml",
     "vehicles/cn_18m1.toml",
     "vehicles/daf_xf.toml",

@@ -86,10 +86,16 @@ pub(super) struct WrittenMember {
     #[serde(default = "one")]
     pub(super) share: f64,
     pub(super) model: Option<WrittenModel>,
+    #[serde(default = "yes")]
+    pub(super) drawn: bool,
 }
 
 fn one() -> f64 {
     1.0
+}
+
+fn yes() -> bool {
+    true
 }
 
 /// What is drawn for each vehicle.

@@ -40,6 +40,8 @@ pub struct Member {
     pub share: f64,
     /// How often each load is drawn, in proportion to those of the others.
     pub loads: BTreeMap<String, f64>,
+    /// Whether its trucks are drawn from the ranges; otherwise each is as its file has it.
+    pub drawn: bool,
 }
 
 /// A vehicle with a load, as reports group episodes.
@@ -87,9 +89,16 @@ impl Fleet {
         let shares = self.shares();
         let entry = |(row, class): (usize, usize)| {
             let (member, load, _) = shares[class];
-            Entry { class, vehicle: self.draw.applied(&member.vehicle, load, &Drawn::of_row(row as u32)) }
+            Entry { class, vehicle: self.truck(member, load, &Drawn::of_row(row as u32)) }
         };
         self.rows(&shares).into_iter().enumerate().map(entry).collect()
+    }
+
+    /// A truck of one kind with one load, as it is drawn.
+    fn truck(&self, member: &Member, load: &str, drawn: &Drawn) -> Vehicle {
+        let of_file = Ranges::default();
+        let ranges = if member.drawn { &self.draw } else { &of_file };
+        ranges.applied(&member.vehicle, load, drawn)
     }
 
     /// The class of each row of the table.
@@ -131,7 +140,7 @@ impl Fleet {
     pub(super) fn extremes(&self) -> impl Iterator<Item = (&Member, Vehicle)> {
         let loads = self.members.iter().flat_map(|member| member.loads.keys().map(move |load| (member, load)));
         loads.flat_map(move |(member, load)| {
-            Drawn::ends().into_iter().map(move |drawn| (member, self.draw.applied(&member.vehicle, load, &drawn)))
+            Drawn::ends().into_iter().map(move |drawn| (member, self.truck(member, load, &drawn)))
         })
     }
 }

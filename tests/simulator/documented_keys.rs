@@ -117,6 +117,7 @@ const SEVERAL_VEHICLES: &str = r#"
 file = "daf_xf"
 loads = { empty = 1.0, laden = 2.0 }
 share = 2.0
+drawn = true
 [vehicle.model]
 slip_lever = 4.0
 yaw_lag = 1.0

@@ -27,7 +27,7 @@ pub fn all_drawn() -> Fleet {
             ..Model::default()
         };
         let loads = ["empty", "half", "laden", "laden_high"].map(|load| (load.to_owned(), 1.0)).into();
-        Member { name: name.to_owned(), vehicle, share, loads }
+        Member { name: name.to_owned(), vehicle, share, loads, drawn: true }
     };
     let draw = Ranges {
         trailer_wheelbase: Some([-0.5, 0.4]),

@@ -32,12 +32,12 @@ fn every_scenario_file_of_the_repository_is_embedded_as_it_is() {
         FILES.iter().map(|&(path, text)| (path.to_owned(), text.to_owned())).collect();
     assert_eq!(
         (files.len(), FILES.len()),
-        (73, 73),
-        "46 benchmarks, ten roundabouts, five outlines, ten vehicles, two distributions"
+        (74, 74),
+        "47 benchmarks, ten roundabouts, five outlines, ten vehicles, two distributions"
     );
     assert!(files == embedded, "on disk {:?}, embedded {:?}", files.keys(), embedded.keys());
     let kinds = [Kind::Benchmark, Kind::Roundabout, Kind::Vehicle, Kind::Distribution];
-    assert_eq!(kinds.map(|kind| kind.names().count()), [46, 10, 10, 2]);
+    assert_eq!(kinds.map(|kind| kind.names().count()), [47, 10, 10, 2]);
 }
 
 /// A shipped benchmark's file as it is read as TOML.
@@ -222,6 +222,13 @@ fn the_benchmarks_of_transfer2026_differ_in_roads_training_and_disturbances_alon
         let [least, trained] = [&refinement, &training].map(|table| table["draw"][key][0].as_float().unwrap());
         assert!(least < trained, "{key}");
     }
+    // One more has the truck of attard2023 beside, which is not drawn.
+    let (mut at_home, attard) = (table("transfer2026-refinement-home"), table("transfer2026-attard2023"));
+    let own = at_home["vehicle"].as_array_mut().unwrap().pop().unwrap();
+    assert_eq!((own["drawn"].as_bool(), own.get("model")), (Some(false), None));
+    assert_eq!(own["file"], attard["vehicle"]);
+    assert!(own["loads"].as_table().unwrap().keys().eq([attard["load"].as_str().unwrap()]));
+    assert_eq!(at_home, refinement);
     for table in [&mut refinement, &mut training] {
         for key in ["procedural", "vehicle", "draw"] {
             table.remove(key);
@@ -289,7 +296,7 @@ fn the_continuous_benchmarks_differ_from_those_with_levels_in_their_actions_alon
 fn every_name_gives_what_its_file_gives() {
     // The largest take minutes; the test of the large benchmarks reads them as text.
     let benchmarks: Vec<&str> = Kind::Benchmark.names().filter(|name| !LARGE.contains(name)).collect();
-    assert_eq!(benchmarks.len(), 44);
+    assert_eq!(benchmarks.len(), 45);
     for name in benchmarks {
         let named = Scenario::named(name).unwrap();
         let read = Scenario::read(&scenarios().join(name).with_extension("toml")).unwrap();

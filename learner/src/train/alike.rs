@@ -93,6 +93,7 @@ mod tests {
             ("laden2026-training", &["laden2026", "laden2026-random", "laden2026-odd"]),
             ("transfer2026-training", &["transfer2026", "transfer2026-random", "transfer2026-held-out"]),
             ("transfer2026-refinement", &["transfer2026", "transfer2026-random"]),
+            ("transfer2026-refinement-home", &["transfer2026", "transfer2026-random"]),
             ("laden2026-50-training", &["laden2026-50", "laden2026-50-random"]),
             ("traffic2026-training", &["traffic2026", "traffic2026-random"]),
             (

@@ -37,7 +37,7 @@ pub(in crate::scenario) fn vehicles(
             };
             check_load(reader, "load", &vehicle, load)?;
             let Some(_) = &written.draw else { return Ok((vehicle, load.clone(), None)) };
-            Vec::from([Member { name, vehicle, share: 1.0, loads: [(load.clone(), 1.0)].into() }])
+            Vec::from([Member { name, vehicle, share: 1.0, loads: [(load.clone(), 1.0)].into(), drawn: true }])
         }
         WrittenVehicles::Many(tables) => {
             if let Some(load) = &written.load {
@@ -91,7 +91,7 @@ fn member(reader: &Reader, source: &Source, key: &str, written: &WrittenMember) 
         ));
     }
     let share = reader.within(&format!("{key}.share"), written.share, 1e-6..=1e6, "")?;
-    Ok(Member { name, vehicle, share, loads: written.loads.clone() })
+    Ok(Member { name, vehicle, share, loads: written.loads.clone(), drawn: written.drawn })
 }
 
 /// The fleet, whose vehicles make sense whatever is drawn.

@@ -8,6 +8,7 @@ fn member(name: &str, share: f64, loads: &[(&str, f64)]) -> Member {
         vehicle,
         share,
         loads: loads.iter().map(|&(load, share)| (load.to_owned(), share)).collect(),
+        drawn: true,
     }
 }
 
@@ -62,6 +63,25 @@ fn a_row_lies_in_every_range_and_another_range_does_not_shift_it() {
             .zip(&more)
             .all(|(a, b)| a.vehicle.trailer == b.vehicle.trailer && a.vehicle.tractor == b.vehicle.tractor)
     );
+}
+
+#[test]
+fn trucks_that_are_not_drawn_are_as_their_file_has_them() {
+    let draw = Ranges { trailer_wheelbase: Some([0.1, 0.4]), drive_lag: Some([0.3, 0.6]), ..Ranges::default() };
+    let all = fleet(draw);
+    let mut some = all.clone();
+    some.members[1].drawn = false;
+    for (entry, other) in some.table().iter().zip(all.table()) {
+        assert_eq!(entry.class, other.class);
+        if entry.class == 2 {
+            let mut of_file = Vehicle::named("eu_4x2_13m6").unwrap();
+            of_file.loads.retain(|load, _| load == "laden");
+            assert_eq!(entry.vehicle, of_file);
+            assert_ne!(entry.vehicle, other.vehicle);
+        } else {
+            assert_eq!(entry.vehicle, other.vehicle);
+        }
+    }
 }
 
 #[test]
