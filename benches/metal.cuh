@@ -62,6 +62,7 @@ HERE float2& operator+=(float2& a, float2 b) { return a = a + b; }
 HERE float4& operator+=(float4& a, float4 b) { return a = a + b; }
 HERE uint2& operator-=(uint2& a, uint2 b) { return a = a - b; }
 HERE bool2 operator==(uint2 a, uint2 b) { return bool2{a.x == b.x, a.y == b.y}; }
+HERE bool2 operator!=(float2 a, float2 b) { return bool2{a.x != b.x, a.y != b.y}; }
 HERE bool2 operator<(float2 a, float2 b) { return bool2{a.x < b.x, a.y < b.y}; }
 HERE bool2 operator<=(float2 a, float2 b) { return bool2{a.x <= b.x, a.y <= b.y}; }
 HERE bool all(bool2 v) { return v.x && v.y; }

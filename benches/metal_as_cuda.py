@@ -18,8 +18,8 @@ BUILT_IN = {
     "threads_per_simdgroup": "metal::uint {} = 32;",
 }
 KERNEL = re.compile(r"\[\[max_total_threads_per_threadgroup\((\d+)\)\]\] kernel void (\w+)\(\n(.*?)\n\) \{\n", re.S)
-# What one thread does to clear workgroup memory, at the beginning of a kernel.
-CLEARED = re.compile(r"    if \(\w+ == 0u\) \{\n.*?\n    \}\n    metal::threadgroup_barrier\(.*?\);\n", re.S)
+# What one thread does to clear workgroup memory, at the beginning of a kernel, after the variables of its own.
+CLEARED = re.compile(r"(?P<own>(?:    \w+ \w+ = \{\};\n)*)    if \(\w+ == 0u\) \{\n.*?\n    \}\n    metal::threadgroup_barrier\(.*?\);\n", re.S)
 
 
 def translated(metal):
@@ -42,6 +42,8 @@ def translated(metal):
         out.append(text[at : kernel.start()])
         out.append(signature(*kernel.groups()))
         cleared = CLEARED.match(text, kernel.end()) if "\n, threadgroup " in kernel.group(3) else None
+        if cleared:
+            out.append(cleared["own"])
         at = cleared.end() if cleared else kernel.end()
     return "".join([*out, text[at:]])
 

@@ -80,7 +80,7 @@ QUEUE = 32
 # Functions that RULES count on.
 KNOWN = {
     "sense": "field_sample",
-    "collide": "body_clearance|sample_first",
+    "collide": "sample_first 2",
     "drive": "driven",
     "advance": "driven",
     "observe": "observed",
@@ -97,27 +97,25 @@ RULES = [
     ("sense.*", r"block_sample 2", False, "ray second block"),
     ("sense.*", r"field_sample/interpolated", False, "ray own cell"),
     ("sense.*", r"rotated", True, "next ray"),
-    ("sense.*", r"^(itself|read_off)", True, "range"),
+    ("sense.*", r"read_off", True, "range"),
     ("sense.*", r"", True, "ray sample"),
     ("sense.*", r"", False, "ray"),
-    # A thread a truck; or its first samples, and then teams.
-    ("collide", r"(sampled 1|sample_first).*block_sample 1", False, "point block"),
-    ("collide", r"(sampled 1|sample_first).*block_sample 2", False, "point second block"),
-    ("collide", r"sampled 1|body_clearance/point_of|sample_first/(sampled|point_of)", False, "point"),
-    (
-        "collide",
-        r"(body_clearance/(is_undecided 1|line_of 1)|sample_first/(is_undecided|line_of|whole_line))",
-        False,
-        "line",
-    ),
-    ("collide", r"sampled 2.*block_sample 1", False, "halving block"),
-    ("collide", r"sampled 2.*block_sample 2", False, "halving second block"),
-    ("collide", r"sampled 2|body_clearance/(is_undecided|line_of|middle)", False, "halving"),
-    ("collide", r"body_clearance", False, "in body_clearance"),
-    ("collide", r"halve/(whole_line|is_undecided 1|line_of 1|sums_of 1)", False, "lines of a pass"),
-    ("collide", r"halve/(body_of|field_at)", False, "pass"),
+    # Its first samples, a tractor's and then its trailer's, four at a time; then teams.
+    ("collide", r"sample_first 1/sampled.*block_sample 1", False, "tractor's point block"),
+    ("collide", r"sample_first 1/sampled.*block_sample 2", False, "tractor's point second block"),
+    ("collide", r"sample_first 1/(sampled|point_of)", False, "tractor's point"),
+    ("collide", r"sample_first 1", True, "tractor's line"),
+    ("collide", r"sample_first 2/sampled.*block_sample 1", False, "trailer's point block"),
+    ("collide", r"sample_first 2/sampled.*block_sample 2", False, "trailer's point second block"),
+    ("collide", r"sample_first 2/(sampled|point_of)", False, "trailer's point"),
+    ("collide", r"sample_first 2", True, "trailer's line"),
+    ("collide", r"halve/sampled.*block_sample 1", False, "halving block"),
+    ("collide", r"halve/sampled.*block_sample 2", False, "halving second block"),
+    ("collide", r"halve/(whole_line|ends_of|is_undecided 1|line_of 1|sums_of 1|keep 1)", False, "lines of a pass"),
+    ("collide", r"halve/(sampled|is_undecided|line_of|middle)", False, "halving"),
+    ("collide", r"halve/(body_of|unit_field_at|n_points_of)|hand_over", False, "pass"),
     ("collide", r"halve", False, "round"),
-    ("collide", r"", True, "unit"),
+    ("collide", r"^itself", True, "pass"),
     ("drive|advance", r"driven", True, "substep"),
     ("observe.*", r"followed", False, "truck"),
     ("observe_after_reset", r"^(itself|observed)(/preview_value)?$", True, "value begun"),
@@ -142,11 +140,14 @@ def times(replay, width, is_queued):
     def some(n_trucks):
         return 1 - (1 - begun) ** n_trucks
 
-    n_lines = 11 + 19
+    # Of 24 points a tractor has 8, which each of four reads takes two of, and a trailer 16.
+    parts = {"tractor's": 2 / 24, "trailer's": 4 / 24}
+    of_points = {"point": "iterations", "point block": "blocks", "point second block": "second_blocks"}
     return {
+        f"{whose} {what}": part * points[count] for whose, part in parts.items() for what, count in of_points.items()
+    } | {
         "never": 0,
         "truck": 1 / width,
-        "unit": 2 / width,
         "value": 69 / width,
         "substep": replay["substeps"] / width,
         # Five waypoints ahead; loops over more values are unrolled by four.
@@ -162,19 +163,15 @@ def times(replay, width, is_queued):
         "ray block": rays["blocks"],
         "ray second block": rays["second_blocks"],
         "some ray": some(1 + width / 29),
-        "point": points["iterations"],
-        "point block": points["blocks"],
-        "point second block": points["second_blocks"],
-        "line": n_lines / width,
-        # All subgroups of a workgroup of 64 go through its passes, over 2 times 8 lines of a tractor or 3 of a trailer.
+        "tractor's line": 11 / width,
+        "trailer's line": 19 / width,
+        # All subgroups of a workgroup of 64 go through its passes, over 3 times 8 lines.
         "pass": teams["passes"] * 64 / width,
-        "lines of a pass": teams["passes"] * 2.5 * 64 / width,
+        "lines of a pass": teams["passes"] * 3 * 64 / width,
         "round": (teams["passes"] + teams["rounds"]) * 64 / width,
         "halving": halvings["iterations"],
         "halving block": halvings["blocks"],
         "halving second block": halvings["second_blocks"],
-        # Its own instructions lie in four loops: over points, lines, and twice over the spans of a round.
-        "in body_clearance": (points["iterations"] + n_lines / width + 2 * halvings["iterations"]) / 4,
     }
 
 

@@ -1,8 +1,10 @@
 // What shaders share with Rust. Printed by src/engine/wgsl.rs from the layout and the constants beside each
 // stage: change those.
 
-// Threads of a workgroup.
+// Trucks of a workgroup, and its threads where none are said.
 const WORKGROUP: u32 = 64u;
+// Threads of a workgroup that writes observations: its memory lets few workgroups in, so each has more threads.
+const WRITERS: u32 = 256u;
 // Trucks whose rays a workgroup shares, at most.
 const TEAM_MAX: u32 = 32u;
 // Values in an observation.

@@ -1,8 +1,8 @@
 // Writes the observation after the action: 69 values, see src/layout/observation.rs; and the values beside it.
 //
-// A thread computes what is its truck's alone. Then the threads of a workgroup write the rows of its trucks together,
-// neighbouring values by neighbouring threads: ranges and previews come straight from where they are. Values that
-// depend on the next waypoint alone are looked up: src/world.rs bakes them.
+// The first threads of a workgroup compute what is a truck's alone, one truck a thread. Then all threads write the rows
+// of its trucks together, neighbouring values by neighbouring threads: ranges and previews come straight from where
+// they are. Values that depend on the next waypoint alone are looked up: src/world.rs bakes them.
 
 // Values that a thread computes: the first ones.
 const N_COMPUTED: u32 = CURVATURES_AT;
@@ -16,13 +16,13 @@ var<workgroup> previewed: array<u32, WORKGROUP>;
 var<workgroup> listed: array<u32, WORKGROUP>;
 var<workgroup> n_listed: atomic<u32>;
 
-@compute @workgroup_size(WORKGROUP)
+@compute @workgroup_size(WRITERS)
 fn observe(thread: Thread) {
     let env = index_of(thread);
     clear_list(thread.local);
-    if is_driving(env) { compute(thread.local, env, as_seen(env)); }
+    if thread.local < WORKGROUP && is_driving(env) { compute(thread.local, env, as_seen(env)); }
     let n_values = n_listed_values();
-    for (var n = thread.local; n < n_values; n += WORKGROUP) {
+    for (var n = thread.local; n < n_values; n += WRITERS) {
         let local = listed[n / N_VALUES];
         let whose = env - thread.local + local;
         next_observation[whose * N_VALUES + n % N_VALUES] = observed(local, whose, n % N_VALUES);
@@ -30,13 +30,13 @@ fn observe(thread: Thread) {
 }
 
 // The first observation of the trucks that began another episode.
-@compute @workgroup_size(WORKGROUP)
+@compute @workgroup_size(WRITERS)
 fn observe_after_reset(thread: Thread) {
     let env = index_of(thread);
     clear_list(thread.local);
-    if has_begun(env) { compute(thread.local, env, as_seen(env)); }
+    if thread.local < WORKGROUP && has_begun(env) { compute(thread.local, env, as_seen(env)); }
     let n_values = n_listed_values();
-    for (var n = thread.local; n < n_values; n += WORKGROUP) {
+    for (var n = thread.local; n < n_values; n += WRITERS) {
         let local = listed[n / N_VALUES];
         let whose = env - thread.local + local;
         observation[whose * N_VALUES + n % N_VALUES] = observed(local, whose, n % N_VALUES);
@@ -44,13 +44,13 @@ fn observe_after_reset(thread: Thread) {
 }
 
 // The observation after the action, and the same as the one before the next action, where what is observed is what is.
-@compute @workgroup_size(WORKGROUP)
+@compute @workgroup_size(WRITERS)
 fn observe_both(thread: Thread) {
     let env = index_of(thread);
     clear_list(thread.local);
-    if is_driving(env) { compute(thread.local, env, Seen(truck[env], progress[env])); }
+    if thread.local < WORKGROUP && is_driving(env) { compute(thread.local, env, Seen(truck[env], progress[env])); }
     let n_values = n_listed_values();
-    for (var n = thread.local; n < n_values; n += WORKGROUP) {
+    for (var n = thread.local; n < n_values; n += WRITERS) {
         let local = listed[n / N_VALUES];
         let whose = env - thread.local + local;
         let value = observed(local, whose, n % N_VALUES);

@@ -35,8 +35,10 @@ pub(crate) use vehicles::first_of_vehicles;
 pub const MOST_IN_GROUP: usize = 8;
 
 constants! {
-    /// Threads of a workgroup.
+    /// Trucks of a workgroup, and its threads where none are said.
     pub const WORKGROUP: u32 = 64;
+    /// Threads of a workgroup that writes observations: its memory lets few workgroups in, so each has more threads.
+    pub const WRITERS: u32 = 256;
     /// Trucks whose rays a workgroup shares, at most.
     pub const TEAM_MAX: u32 = 32;
     /// Values in an observation.

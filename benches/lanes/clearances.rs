@@ -76,19 +76,18 @@ pub fn in_step(units: &[[Unit; 2]], width: usize) -> Value {
     })
 }
 
-/// What workgroups do a truck whose threads halve the spans of their trucks' units together: passes over as many units
-/// as there are teams of LANES threads, and rounds until the last of a pass has no spans.
+/// What workgroups do a truck whose threads halve the spans of their trucks' units together, tractors' and trailers' in
+/// one list: passes over as many units as there are teams of LANES threads, and rounds until the last of a pass has no
+/// spans.
 pub fn by_teams(units: &[[Unit; 2]]) -> Result<Value, String> {
     let n_teams = WORKGROUP as usize / constant("LANES")? as usize;
     let (mut n_passes, mut n_rounds) = (0, 0);
     for trucks in units.chunks(WORKGROUP as usize) {
-        for unit in 0..2 {
-            let undecided: Vec<usize> =
-                trucks.iter().map(|truck| truck[unit].rounds.len()).filter(|&rounds| 0 < rounds).collect();
-            for pass in undecided.chunks(n_teams) {
-                n_passes += 1;
-                n_rounds += pass.iter().max().unwrap_or(&0);
-            }
+        let rounds = trucks.iter().flatten().map(|unit| unit.rounds.len());
+        let undecided: Vec<usize> = rounds.filter(|&rounds| 0 < rounds).collect();
+        for pass in undecided.chunks(n_teams) {
+            n_passes += 1;
+            n_rounds += pass.iter().max().unwrap_or(&0);
         }
     }
     let a_truck = |count: usize| count as f64 / units.len() as f64;

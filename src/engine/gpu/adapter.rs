@@ -4,7 +4,7 @@ use wgpu::{Backends, DeviceType, Instance, InstanceDescriptor, Limits};
 
 use super::Error;
 use crate::engine::stages::{N_STORAGE_BUFFERS, WORKGROUP_MEMORY};
-use crate::layout::WORKGROUP;
+use crate::layout::WRITERS;
 
 /// An adapter as it presents itself.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -89,7 +89,7 @@ pub(super) fn check_limits(adapter: &wgpu::Adapter) -> Result<(), Error> {
             max_storage_buffers_per_shader_stage,
             N_STORAGE_BUFFERS as u32,
         ),
-        ("the number of threads in a workgroup", max_compute_invocations_per_workgroup, WORKGROUP),
+        ("the number of threads in a workgroup", max_compute_invocations_per_workgroup, WRITERS),
         ("the memory of a workgroup (bytes)", max_compute_workgroup_storage_size, WORKGROUP_MEMORY),
     ];
     match needs.into_iter().find(|(_, has, needed)| has < needed) {
