@@ -27,7 +27,7 @@ from collections import Counter
 from pathlib import Path
 
 from metal_as_cuda import translated
-from model import TOUCHED
+from model import AT_ONCE, TOUCHED
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 CARGO = ["--release", "--locked", "--manifest-path", REPOSITORY / "Cargo.toml"]
@@ -72,10 +72,11 @@ def main():
     acts = output([args.acting, "shader"] if args.acting else ACTING)
     sources = [translated(metal(args.naga, module)) for module in (step(args.shaders), acts)]
     nvidia = {chip: kernels(sources[0], cuda, chip) | kernels(sources[1], cuda, chip) for chip in args.chips.split(",")}
+    alone = {part for parts in AT_ONCE.values() for part in parts}
     for chip, found in nvidia.items():
         for name, kernel in found.items():
-            # The model counts on those of the last chip.
-            if chip != list(nvidia)[-1] or name not in TOUCHED:
+            # The model counts on those of the last chip, and on kernels that do at once what others do alone.
+            if chip != list(nvidia)[-1] or name not in TOUCHED or name in alone:
                 del kernel["parts"]
     for chip, found in nvidia.items():
         print(f"{chip}: kernel, registers, stack (bytes), shared memory (bytes), instructions")
@@ -92,7 +93,10 @@ def main():
         "replay": json.loads(output([args.lanes] if args.lanes else LANES)),
     }
     if args.json:
-        text = re.sub(r"\[\s+(\d+),\s+(\d+)\s+\]", r"[\1, \2]", json.dumps(result, indent=1))
+        text = json.dumps(result, indent=1)
+        # What holds no table stands in one line.
+        for innermost in (r"\[[^][{}]*\]", r"\{[^{}]*\}"):
+            text = re.sub(innermost, lambda found: " ".join(found[0].split()), text)
         args.json.write_text(text + "\n")
 
 
