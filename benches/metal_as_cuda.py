@@ -19,7 +19,10 @@ BUILT_IN = {
 }
 KERNEL = re.compile(r"\[\[max_total_threads_per_threadgroup\((\d+)\)\]\] kernel void (\w+)\(\n(.*?)\n\) \{\n", re.S)
 # What one thread does to clear workgroup memory, at the beginning of a kernel, after the variables of its own.
-CLEARED = re.compile(r"(?P<own>(?:    \w+ \w+ = \{\};\n)*)    if \(\w+ == 0u\) \{\n.*?\n    \}\n    metal::threadgroup_barrier\(.*?\);\n", re.S)
+CLEARED = re.compile(
+    r"(?P<own>(?:    \w+ \w+ = \{\};\n)*)    if \(\w+ == 0u\) \{\n.*?\n    \}\n    metal::threadgroup_barrier\(.*?\);\n",
+    re.S,
+)
 
 
 def translated(metal):
