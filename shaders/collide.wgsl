@@ -5,9 +5,9 @@
 // corners themselves. The distance is 1-Lipschitz, so two samples bound it between them; the middle is sampled only
 // where the bound is not tight enough.
 //
-// A thread samples the first points of its truck's unit. Few units then have spans to halve: the workgroup's threads do
-// that together, a team of LANES threads for each such unit, one sample a thread. They keep its spans each in its own
-// memory, since workgroup memory would let few workgroups in.
+// A thread samples the first points of its truck's units. Few units then have spans to halve: the workgroup's threads
+// do that together, a team of LANES threads for each such unit, one sample a thread. They keep its spans each in its
+// own memory, since workgroup memory would let few workgroups in.
 
 // Teams of a workgroup.
 const TEAMS: u32 = WORKGROUP / LANES;
