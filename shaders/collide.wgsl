@@ -13,7 +13,7 @@
 const TEAMS: u32 = WORKGROUP / LANES;
 // Spans that a round adds at most to a team's.
 const N_ADDED: u32 = 2u * LANES;
-// The place of a truck whose unit is decided.
+// The place in the list of a unit that is decided.
 const NO_TEAM: u32 = 0xffffffffu;
 
 // Distances at the points of this thread's truck that are sampled first: the tractor's, then the trailer's.
@@ -21,7 +21,7 @@ var<private> own_firsts: array<f32, 2u * N_FIRST>;
 // Every LANES-th of the undecided spans of this thread's team, last in first out.
 var<private> own_spans: array<Span, N_SPANS / LANES>;
 
-// Trucks whose unit has undecided spans.
+// Units of the workgroup's trucks that have undecided spans: places given so far, and how many they are.
 var<workgroup> n_undecided: atomic<u32>;
 var<workgroup> n_units: u32;
 // For each team its unit: position and direction, which one, vehicle, route, the least clearance found, and distances

@@ -1,5 +1,5 @@
-//! The buffers that the replay buffer's kernels are bound to: its own, the
-//! simulator's columns, and what the learner is given and gives.
+//! The buffers that the replay buffer's kernels are bound to: its own, the simulator's columns, and what the learner is
+//! given and gives.
 
 use bytemuck::{bytes_of, cast_slice};
 use offtrack::gpu::{Device, Kernels, Slice};
