@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 import numpy.typing as npt
 from multibody import Array, SpeedControl, Trucks
@@ -226,6 +227,13 @@ def table(results: dict[str, dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
+def made_with() -> dict[str, Any]:
+    """What a figure was measured with; MuJoCo comes as a package of this name or as ``mujoco-core``."""
+    made = about("numpy")
+    made["versions"]["mujoco"] = mujoco.__version__
+    return made
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description="A policy in a multibody truck", formatter_class=argparse.ArgumentDefaultsHelpFormatter
@@ -246,7 +254,7 @@ def main() -> None:
     if args.validate:
         rows = validate()
         if args.json:
-            write_json(args.json, about("mujoco-core", "numpy") | {"checks": rows})
+            write_json(args.json, made_with() | {"checks": rows})
         return
     if args.starts < 1 or not 0 <= args.delay <= 2 or not 0.05 <= args.mu <= 2:
         parser.error("--starts: at least 1; --delay: 0..2; --mu: 0.05..2")
@@ -268,7 +276,7 @@ def main() -> None:
     print(table(results))
     if args.json:
         settings = {name: getattr(args, name) for name in ("vehicle", "starts", "seed", "mu", "delay")}
-        made = about("mujoco-core", "numpy") | {
+        made = made_with() | {
             "policy": policy.name,
             "benchmark": args.benchmark,
             "settings": settings,
