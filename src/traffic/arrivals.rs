@@ -92,6 +92,9 @@ pub fn arrive(
         backlog[word] += u32::from(has_room) << bit;
         tell(if has_room { Event::Came(source) } else { Event::Stayed(source) }, cars);
     }
+    if *backlog == [0; 2] {
+        return;
+    }
     // Where slots are short the last sources would never have one. Benchmarks, whose slots are fewer, keep their order.
     let n = network.sources.len();
     let n_free = || cars.iter().filter(|car| !car.is_there()).count();

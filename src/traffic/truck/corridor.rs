@@ -76,11 +76,8 @@ impl Points {
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
 fn to_nearest(points: &Points, outlines: &[Outline], begins: Vec2) -> [f32; CORRIDOR_SAMPLES] {
     let mut nearest = [f32::MAX; CORRIDOR_SAMPLES];
-    for Outline { middle, along, half_length, half_width } in outlines {
-        let reach = REACH + half_length + half_width;
-        if reach * reach < middle.distance_squared(begins) {
-            continue;
-        }
+    for unit in outlines.iter().filter(|unit| is_in_reach(unit, begins)) {
+        let Outline { middle, along, half_length, half_width } = unit;
         for (nearest, (x, y)) in nearest.iter_mut().zip(points.x.iter().zip(&points.y)) {
             let (x, y) = (x - middle.x, y - middle.y);
             let ahead = ((x * along.x + y * along.y).abs() - half_length).max(0.0);
@@ -91,12 +88,27 @@ fn to_nearest(points: &Points, outlines: &[Outline], begins: Vec2) -> [f32; CORR
     nearest
 }
 
+/// Whether the corridor that begins at a point may reach a rectangle.
+#[inline(always)]
+fn is_in_reach(outline: &Outline, begins: Vec2) -> bool {
+    let reach = REACH + outline.half_length + outline.half_width;
+    outline.middle.distance_squared(begins) <= reach * reach
+}
+
+fn reaches(outlines: &[Outline], begins: Vec2) -> bool {
+    outlines.iter().any(|outline| is_in_reach(outline, begins))
+}
+
 /// Takes the ground that a truck covers into account.
 pub(super) fn mind(view: &View, driver: &mut Driver) {
     let car = *driver.car();
     let network = driver.network();
     let (first, at_front) = (first(network, &car), front(network, &car));
     if is_far(view, at_front) {
+        return;
+    }
+    if !reaches(&view.now, at_front) && (view.waits || !reaches(&view.later, at_front)) {
+        // Then no unit is near its front either.
         return;
     }
     let samples = corridor(network, &car, first);
