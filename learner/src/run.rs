@@ -48,7 +48,12 @@ pub struct Run<'a> {
     pub validation: Option<Validation>,
     checkpointer: Checkpointer,
     kept: KeptPolicies,
+    /// Env steps of the checkpoint that it continues from, until a later policy is written.
+    continued: Option<u64>,
 }
+
+/// Has what was reported of an earlier policy of a run no longer hold.
+pub type Outdate<'f> = &'f dyn Fn(&Run) -> Result<(), Error>;
 
 impl<'a> Run<'a> {
     /// A run at its beginning. Its first checkpoint is written at once.
@@ -69,6 +74,7 @@ impl<'a> Run<'a> {
             progress,
             checkpointer: Checkpointer::new(folder, config.checkpoint_minutes),
             kept: KeptPolicies::new(folder),
+            continued: None,
             config: config.clone(),
             backend,
         }
@@ -80,10 +86,11 @@ impl<'a> Run<'a> {
     }
 
     /// Trains until the budget is spent or `stopped` says so. A diverged learner and a failed device are errors; a file
-    /// that cannot be written is reported and tried again.
-    pub fn learn(&mut self, stopped: impl Fn() -> bool) -> Result<(), Error> {
+    /// that cannot be written is reported and tried again. A run that continues calls `outdate` before it writes its
+    /// first policy.
+    pub fn learn(&mut self, stopped: impl Fn() -> bool, outdate: Outdate) -> Result<(), Error> {
         let backend = self.backend.clone();
-        match backend.guarded(|| self.learn_until(&stopped)) {
+        match backend.guarded(|| self.learn_until(&stopped, outdate)) {
             Err(error) if error.is_device_failure() => {
                 let message = match error {
                     Error::Device(message) => message,
@@ -95,11 +102,11 @@ impl<'a> Run<'a> {
         }
     }
 
-    fn learn_until(&mut self, stopped: &impl Fn() -> bool) -> Result<(), Error> {
+    fn learn_until(&mut self, stopped: &impl Fn() -> bool, outdate: Outdate) -> Result<(), Error> {
         while self.progress.fraction() < 1.0 && !stopped() {
             if self.is_refinement_due() {
                 self.refine()?;
-                self.checkpoint_if_due()?;
+                self.checkpoint_if_due(outdate)?;
                 continue;
             }
             let is_warm = self.training.is_warm()?;
@@ -119,7 +126,7 @@ impl<'a> Run<'a> {
                 }
                 self.progress.show_if_due();
             }
-            self.checkpoint_if_due()?;
+            self.checkpoint_if_due(outdate)?;
         }
         // With a budget of time the clock may have ended the loop just before the last one.
         if self.validate_if_due()? {
@@ -235,9 +242,9 @@ impl<'a> Run<'a> {
     }
 
     /// Writes the last checkpoint, policy and row. Everything is tried before the first failure is returned.
-    pub fn close(&mut self) -> Result<(), Error> {
+    pub fn close(&mut self, outdate: Outdate) -> Result<(), Error> {
         self.check()?;
-        self.begin_checkpoint()?;
+        self.begin_checkpoint(outdate)?;
         let written = self.checkpointer.wait();
         // The last row is not in the checkpoint: a run that continues takes it back.
         self.add_sums()?;
@@ -246,20 +253,24 @@ impl<'a> Run<'a> {
         written.map_or(Ok(()), |Written { checkpoint, policy }| checkpoint.and(policy)).and(row).and(routes)
     }
 
-    fn checkpoint_if_due(&mut self) -> Result<(), Error> {
+    fn checkpoint_if_due(&mut self, outdate: Outdate) -> Result<(), Error> {
         if let Some(Written { checkpoint, policy }) = self.checkpointer.finished() {
             self.progress.note(self.checkpointer.file(), checkpoint);
             self.progress.note(self.checkpointer.policy(), policy);
         }
         if self.checkpointer.is_due() {
             self.check()?;
-            self.begin_checkpoint()?;
+            self.begin_checkpoint(outdate)?;
         }
         Ok(())
     }
 
     /// Begins to write a checkpoint and the policy.
-    fn begin_checkpoint(&mut self) -> Result<(), Error> {
+    fn begin_checkpoint(&mut self, outdate: Outdate) -> Result<(), Error> {
+        if self.continued.is_some_and(|env_steps| env_steps < self.progress.env_steps()) {
+            outdate(self)?;
+            self.continued = None;
+        }
         let policy = self.policy()?.to_bytes();
         let mut columns = Columns::default();
         self.progress.save(&mut columns);
@@ -285,7 +296,13 @@ impl<'a> Run<'a> {
                 self.progress.show_validation(last.success, best.success);
             }
         }
+        self.continued = Some(self.progress.env_steps());
         self.training.restore(stored, self.progress.updates())
+    }
+
+    /// Whether it continued, and has made no step since.
+    pub fn has_learned_nothing(&self) -> bool {
+        self.continued == Some(self.progress.env_steps())
     }
 
     /// Lets go of policies that were kept after the point from which the run goes on.

@@ -31,7 +31,7 @@ use crate::run::Run;
 use crate::run::folder::Folder;
 use crate::run::metrics_file::MetricsFile;
 use crate::run::progress::Progress;
-use crate::run::resume::Resumed;
+use crate::run::resume::{Resumed, is_evaluated};
 use crate::run::route_counts::RouteCounts;
 use crate::run::validation::Validation;
 use crate::session::Session;
@@ -150,22 +150,25 @@ impl Training {
 
     /// Trains and evaluates in a new folder, which `make` makes once all that can be wrong with the input is known.
     pub fn begin(&self, make: impl FnOnce(&Config) -> Result<Folder, Error>, caller: Caller) -> Result<Outcome, Error> {
-        let prepared = self.prepare(&self.config)?;
+        let prepared = self.prepare(&self.config, true)?;
         self.run(&self.config, prepared, Opened::new(make(&self.config)?)?, caller)
     }
 
     /// Continues a run of this config, and evaluates.
     pub fn resume(&self, resumed: Resumed, caller: Caller) -> Result<Outcome, Error> {
-        let prepared = self.prepare(&self.config)?;
+        let prepared = self.prepare(&self.config, resumed.stored.is_none())?;
         self.run(&self.config, prepared, resumed.into(), caller)
     }
 
-    fn prepare(&self, config: &Config) -> Result<Prepared, Error> {
+    /// Trucks and learner; where the run `begins`, with the policy that it begins with.
+    fn prepare(&self, config: &Config, begins: bool) -> Result<Prepared, Error> {
         let backend = Backend::open(config)?;
         let Worlds { training, training_world, .. } = &self.worlds;
         let routes = training.split(Split::Train).to_vec();
         let mut session = backend.guarded(|| Session::new(&backend, config, training_world.clone(), routes))?;
-        session.begin()?;
+        if begins {
+            session.begin()?;
+        }
         Ok(Prepared { backend, session, validation: self.worlds.validation(config) })
     }
 
@@ -174,6 +177,7 @@ impl Training {
     fn run(&self, config: &Config, prepared: Prepared, opened: Opened, caller: Caller) -> Result<Outcome, Error> {
         let Prepared { backend, session, validation } = prepared;
         let Opened { folder, mut metrics, stored, has_new_budget } = opened;
+        let metrics_are_lost = metrics.is_new();
         if stored.is_none() {
             // It starts from the beginning: rows that were written before the first checkpoint come again.
             metrics.clear()?;
@@ -185,10 +189,11 @@ impl Training {
         run.validation = validation;
         let mut resumed = None;
         if let Some(stored) = stored {
+            if metrics_are_lost {
+                let file = shown_path(&folder.metrics());
+                caller.tell(Event::Warning(&format!("{file}: is missing: its rows begin again here")));
+            }
             run.restore(&stored)?;
-            // The earlier evaluation was of another policy.
-            files::write_json(&folder.report(), &Outcome { interrupted: true, ..Outcome::of(config, &run) })?;
-            let _ = std::fs::remove_file(folder.page());
             resumed = Some((run.progress.env_steps(), run.progress.seconds()));
         }
         run.continue_kept()?;
@@ -206,10 +211,21 @@ impl Training {
             rewards: &config.changed_rewards(),
             device: &run.device(),
         }));
-        run.learn(|| caller.stops())?;
+        // The earlier evaluation is of another policy as soon as there is a later one.
+        let outdate = |run: &Run| {
+            files::write_json(&folder.report(), &Outcome { interrupted: true, ..Outcome::of(config, run) })?;
+            let _ = std::fs::remove_file(folder.page());
+            Ok(())
+        };
+        run.learn(|| caller.stops(), &outdate)?;
         let outcome = Outcome::of(config, &run);
-        let written = run.close();
+        let written = run.close(&outdate);
         let policy = run.policy()?;
+        if outcome.interrupted && run.has_learned_nothing() && is_evaluated(&folder) {
+            written?;
+            caller.tell(Event::Finished { folder: &folder, outcome: &outcome });
+            return Ok(outcome);
+        }
         drop(run);
         self.conclude(&folder, outcome, policy, caller, written)
     }

@@ -7,7 +7,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use offtrack_learner::config::{Config, Rule};
-use offtrack_learner::train::{Event, Watcher, train};
+use offtrack_learner::train::{Event, Watcher, resume, train};
 
 /// A benchmark of one training route and two test routes.
 const BENCHMARK: &str = r#"
@@ -190,4 +190,61 @@ fn what_is_wrong_with_a_config_or_a_folder_is_named_and_nothing_is_made_or_repla
     let error = train(&config, &folder, DEAF, &go_on).unwrap_err();
     assert!(error.to_string().contains("folder: ") && error.to_string().contains("never overwritten"), "{error}");
     assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 1);
+}
+
+#[test]
+fn an_evaluation_stands_until_a_run_that_continues_has_learned_more() {
+    let place = tempfile::tempdir().unwrap();
+    let folder = place.path().join("run");
+    train(&small(place.path()), &folder, DEAF, &AtomicBool::new(false)).unwrap();
+    let (report, page) = (std::fs::read(folder.join("report.json")).unwrap(), folder.join("report.html"));
+    let stands = || std::fs::read(folder.join("report.json")).unwrap() == report && page.is_file();
+    // What is refused changes nothing.
+    let list = folder.join("policies/policies.json");
+    let whole = std::fs::read(&list).unwrap();
+    std::fs::write(&list, "[{").unwrap();
+    resume(&folder, None, Some(6000), DEAF, &AtomicBool::new(false)).unwrap_err();
+    assert!(stands());
+    std::fs::write(&list, whole).unwrap();
+    // Nor does what is stopped before its first step.
+    let stop = AtomicBool::new(false);
+    let stopping = |event: Event| {
+        if matches!(event, Event::Begun(_)) {
+            stop.store(true, Ordering::Relaxed);
+        }
+    };
+    assert!(resume(&folder, None, Some(6000), &stopping, &stop).unwrap().interrupted);
+    assert!(stands());
+    let outcome = resume(&folder, None, Some(6000), DEAF, &AtomicBool::new(false)).unwrap();
+    assert!(!outcome.interrupted && !stands() && page.is_file());
+    // An evaluation that was lost is made up for without a larger budget.
+    std::fs::remove_file(folder.join("report.json")).unwrap();
+    let again = resume(&folder, None, Some(6000), DEAF, &AtomicBool::new(false)).unwrap();
+    assert!(again.evaluation.is_some());
+    resume(&folder, None, Some(6000), DEAF, &AtomicBool::new(false)).unwrap_err();
+}
+
+#[test]
+fn a_run_continues_without_the_policy_that_it_began_with_and_without_its_rows() {
+    let place = tempfile::tempdir().unwrap();
+    let [first, second] = ["first", "second"].map(|name| place.path().join(name));
+    train(&small(place.path()), &first, DEAF, &AtomicBool::new(false)).unwrap();
+    let policy = first.join("policy.safetensors");
+    let config = Config { from: Some(policy.display().to_string()), ..small(place.path()) };
+    train(&config, &second, DEAF, &AtomicBool::new(false)).unwrap();
+    std::fs::remove_file(policy).unwrap();
+    std::fs::remove_file(second.join("metrics.csv")).unwrap();
+    let warnings = Mutex::<Vec<String>>::default();
+    let watcher = |event: Event| {
+        if let Event::Warning(line) = event {
+            warnings.lock().unwrap().push(line.to_owned());
+        }
+    };
+    let outcome = resume(&second, None, Some(6000), &watcher, &AtomicBool::new(false)).unwrap();
+    assert!(outcome.evaluation.is_some());
+    let warnings = warnings.into_inner().unwrap();
+    assert!(warnings.len() == 1 && warnings[0].contains("metrics.csv: is missing"), "{warnings:?}");
+    let metrics = std::fs::read_to_string(second.join("metrics.csv")).unwrap();
+    let env_steps = metrics.lines().nth(1).and_then(|row| row.split(',').nth(1)).map(str::parse::<u64>);
+    assert!(env_steps.is_some_and(|steps| 4000 < steps.unwrap()), "{metrics}");
 }

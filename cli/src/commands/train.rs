@@ -95,9 +95,10 @@ fn config(args: &Args, file: &Path) -> Result<Config, Error> {
     Ok(config)
 }
 
-/// An error if `--set` gives a value that a flag of its own gives, too.
+/// An error if `--set` gives a value that a flag of its own gives, too, or gives one twice.
 fn check_settings(args: &Args) -> Result<(), Error> {
     let flags = [
+        ("--benchmark", args.benchmark.is_some(), "benchmark"),
         ("--seed", args.seed.is_some(), "seed"),
         ("--seeds", args.seeds.is_some(), "seed"),
         ("--minutes", args.minutes.is_some(), "minutes"),
@@ -106,8 +107,13 @@ fn check_settings(args: &Args) -> Result<(), Error> {
         ("--from", args.from.is_some(), "from"),
         ("--adapter", args.adapter.is_some(), "adapter"),
     ];
-    for setting in &args.settings {
-        let key = setting.split_once('=').map(|(key, _)| key.trim());
+    let key_of = |setting: &'_ String| setting.split_once('=').map(|(key, _)| key.trim().to_owned());
+    for (index, setting) in args.settings.iter().enumerate() {
+        let key = key_of(setting);
+        if let Some(other) = args.settings[..index].iter().find(|other| key.is_some() && key_of(other) == key) {
+            return Err(Error::setting("--set", setting, format!("{other} is given, too: leave one of them out")));
+        }
+        let key = key.as_deref();
         if let Some((flag, ..)) = flags.iter().find(|(_, is_given, own)| *is_given && Some(*own) == key) {
             return Err(Error::setting("--set", setting, format!("{flag} is given, too: leave one of them out")));
         }

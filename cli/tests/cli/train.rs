@@ -68,6 +68,11 @@ fn a_run_that_cannot_be_is_refused_before_a_folder_is_made() {
         (&["--minutes", "-1"][..], "minutes"),
         (&["--steps", "0"][..], "steps: 0; must lie in"),
         (&["--steps", "5000", "--set", "steps=6000"][..], "--set: steps=6000; --steps is given, too: leave one of"),
+        (&["--set", "seed=1", "--set", "seed=2"][..], "--set: seed=2; seed=1 is given, too: leave one of them out"),
+        (
+            &["--benchmark", "laden2026", "--set", "benchmark=random2026"][..],
+            "--set: benchmark=random2026; --benchmark is given, too: leave one of them out",
+        ),
         (&["--seeds", "1,2", "--set", "seed=7"][..], "--set: seed=7; --seeds is given, too: leave one of them out"),
     ] {
         let message = refusal(&place.train(arguments), 2);

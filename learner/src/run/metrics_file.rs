@@ -21,13 +21,15 @@ pub struct MetricsFile {
     file: File,
     /// Bytes of whole rows.
     length: u64,
+    /// It was not there before.
+    is_new: bool,
 }
 
 impl MetricsFile {
     /// A new file with the names of its columns.
     pub fn create(path: PathBuf) -> Result<MetricsFile, Error> {
         let file = OpenOptions::new().append(true).create_new(true).open(&path).map_err(Error::write(&path))?;
-        let mut metrics_file = MetricsFile { path, file, length: 0 };
+        let mut metrics_file = MetricsFile { path, file, length: 0, is_new: true };
         metrics_file.lock()?;
         metrics_file.append(HEAD)?;
         Ok(metrics_file)
@@ -37,7 +39,8 @@ impl MetricsFile {
     pub fn open(path: PathBuf) -> Result<MetricsFile, Error> {
         let read = OpenOptions::new().read(true).append(true).open(&path);
         let file = read.map_err(Error::read(&path))?;
-        let metrics_file = MetricsFile { length: file.metadata().map_err(Error::read(&path))?.len(), path, file };
+        let metrics_file =
+            MetricsFile { length: file.metadata().map_err(Error::read(&path))?.len(), path, file, is_new: false };
         metrics_file.lock()?;
         let mut head = String::new();
         BufReader::new(&metrics_file.file).read_line(&mut head).map_err(Error::read(&metrics_file.path))?;
@@ -73,6 +76,11 @@ impl MetricsFile {
         &self.path
     }
 
+    /// Whether it was not there before.
+    pub fn is_new(&self) -> bool {
+        self.is_new
+    }
+
     /// Bytes of whole rows.
     pub fn length(&self) -> u64 {
         self.length
@@ -95,8 +103,9 @@ impl MetricsFile {
         self.cut(HEAD.len() as u64)
     }
 
-    /// Removes the rows after the first `length` bytes.
+    /// Removes the rows after the first `length` bytes. A new file has no row.
     pub fn cut(&mut self, length: u64) -> Result<(), Error> {
+        let length = if self.is_new { HEAD.len() as u64 } else { length };
         if self.length < length {
             let message =
                 format!("has {} bytes where its checkpoint expects {length}: put the whole file back", self.length);

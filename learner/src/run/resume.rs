@@ -63,12 +63,14 @@ impl Resumed {
         let (seconds, env_steps) = progress::reached(&stored)?;
         let over = config.minutes.is_some_and(|minutes| 60.0 * minutes <= seconds)
             || config.steps.is_some_and(|steps| steps <= env_steps);
-        if over && has_new_budget {
+        let is_evaluated = is_evaluated(&folder);
+        let ends_here = config.steps == Some(env_steps) && !is_evaluated;
+        if over && has_new_budget && !ends_here {
             let expected =
                 format!("it was trained for {:.2} min and {env_steps} env steps: more are needed", seconds / 60.0);
             return Err(refused(path, expected));
         }
-        if over && is_evaluated(&folder) {
+        if over && is_evaluated {
             let expected =
                 "it has finished, see its report.json; with more --minutes or --steps than it had it continues"
                     .to_owned();
@@ -89,7 +91,7 @@ fn give_budget(config: &mut Config, minutes: Option<f64>, steps: Option<u64>) ->
 }
 
 /// The final evaluation has been written.
-fn is_evaluated(folder: &Folder) -> bool {
+pub fn is_evaluated(folder: &Folder) -> bool {
     let report =
         read_bytes(&folder.report(), REPORT_LIMIT).ok().and_then(|bytes| serde_json::from_slice::<Value>(&bytes).ok());
     report.is_some_and(|report| report["interrupted"] == false)

@@ -61,7 +61,7 @@ impl Training {
             None => seeds.first().copied(),
         };
         // All that can be wrong with the input is found before a folder is made.
-        let mut prepared = next.map(|seed| self.prepare(&of_seed(seed))).transpose()?;
+        let mut prepared = next.map(|seed| self.prepare(&of_seed(seed), true)).transpose()?;
         let group = match earlier {
             Some(group) => group,
             None => Group(folder::make(runs, name, file)?),
@@ -77,7 +77,7 @@ impl Training {
             let config = of_seed(seed);
             let prepared = match prepared.take() {
                 Some(prepared) => prepared,
-                None => self.prepare(&config)?,
+                None => self.prepare(&config, true)?,
             };
             let opened = group.open(seed, file, &config)?;
             caller.tell(Event::Seed { seed, index, n_seeds: seeds.len() });
