@@ -66,8 +66,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
             expected: format!("must lie in 1..{MOST}"),
         });
     }
-    let Some(end) = args.first.checked_add(args.count) else {
-        let expected = format!("must be at most {} for so many roads", u32::MAX - args.count);
+    let Some(last) = args.first.checked_add(args.count - 1) else {
+        let expected = format!("must be at most {} for so many roads", u32::MAX - (args.count - 1));
         return Err(Error::Setting { name: "--first", value: args.first.to_string(), expected });
     };
     if let Some(plot) = &args.plot
@@ -84,7 +84,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     let distribution = [("--distribution", Some(Path::new(&args.distribution)))];
     outputs::distinct(&[("--plot", args.plot.as_deref())], &[&read[..], &distribution].concat())?;
     let distribution = Distribution::find(&args.distribution)?;
-    let indices: Vec<u32> = (args.first..end).collect();
+    let indices: Vec<u32> = (args.first..=last).collect();
     let roads = roads::loading("drawing", |loading| distribution.roads(args.seed, &indices, loading))?;
     // All that can fail but the writing itself is done before anything is written.
     let sheets = match &args.output {

@@ -35,7 +35,7 @@ pub struct Args {
     /// Print the ways through every junction, as --way takes them.
     #[arg(long, conflicts_with_all = ["ring", "ways", "arms", "check", "output"])]
     junctions: bool,
-    /// Print everything that is odd in the map and in its roundabouts, and why every other island or block is none.
+    /// Print all warnings about the map and its roundabouts, and why every other island or block is none.
     #[arg(long, conflicts_with = "output")]
     check: bool,
     /// Write one roundabout to this file, NAME.outline.toml: what is driven on, without the map.

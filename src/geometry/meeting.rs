@@ -4,6 +4,9 @@ use glam::DVec2;
 
 use super::Piece;
 
+/// Circles at most this far apart touch (m).
+const TOUCHING: f64 = 1e-6;
+
 impl Piece {
     /// The common points of two pieces, including points of contact; stretches that coincide are not listed.
     pub(crate) fn meetings(&self, other: &Piece) -> Vec<DVec2> {
@@ -29,7 +32,8 @@ impl Piece {
                 let ahead = (distance * distance + radius * radius - other_radius * other_radius) / (2.0 * distance);
                 let square = radius * radius - ahead * ahead;
                 // Tangent circles meet in one point, although rounding may separate them.
-                if square < -1e-9 * radius * radius {
+                let apart = (distance - (radius + other_radius)).max((radius - other_radius).abs() - distance);
+                if square < -1e-9 * radius * radius || TOUCHING < apart {
                     return Vec::new();
                 }
                 let direction = between / distance;

@@ -187,3 +187,23 @@ fn a_curve_is_walked_by_arc_length() {
     assert!((middle.length() - 4.0).abs() < 1e-12 && middle.point_at(0.0) == DVec2::new(5.0, 0.0));
     assert!((curve.station(curve.point_at(8.0)) - 8.0).abs() < 1e-9);
 }
+
+#[test]
+fn nearly_straight_arcs_metres_apart_do_not_meet_and_those_that_touch_do() {
+    // Of a radius of 300 km: beside each other, and one behind the other, like two sides of a lane.
+    let arc = |centre: DVec2, radius: f64| Curve::circle(centre, radius).pieces[0];
+    let radius = 3e5;
+    let meet = |one: Piece, other: Piece| !one.meetings(&other).is_empty();
+    for apart in [1e-3, 0.5, 8.0] {
+        assert!(!meet(arc(DVec2::ZERO, radius), arc(DVec2::new(2.0 * radius + apart, 0.0), radius)), "{apart}");
+        assert!(!meet(arc(DVec2::ZERO, radius), arc(DVec2::new(1.0, 0.0), radius - 1.0 - apart)), "{apart}");
+    }
+    let right = |centre: f64, radius: f64, to: f64| Piece::Arc {
+        centre: DVec2::new(centre, 0.0),
+        radius,
+        from: to - 0.5,
+        sweep: 1.0,
+    };
+    assert!(meet(right(0.0, radius, 0.0), right(2.0 * radius, radius, PI)));
+    assert!(meet(right(0.0, 20.0, 0.0), right(1.0, 19.0, 0.0)));
+}

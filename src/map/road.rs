@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec2;
 
-use super::ground::{self, Edges, Ground, Kerb, Line};
+use super::ground::{Edges, Ground, Kerb, Line};
 use super::parametric::lane;
 use super::route::{Lane, LeavesWorld, Route, waypoints};
 use crate::geometry::{Curve, Outline};
@@ -155,21 +155,24 @@ impl Road {
     ///
     /// An arm that is too short, with the longest approach or departure that fits.
     pub fn routes(&self, approach: f64, departure: f64, spacing: f64) -> Result<Vec<Route>, LeavesWorld> {
+        let lines = &self.ground.lines;
+        let stations = |line: &Line| lane::ring_stations(&line.line, self.ground.outer_radius);
+        let stations: Vec<(f64, f64)> = lines.iter().map(stations).collect();
+        for (part, asked, end) in [("approach", approach, 0), ("departure", departure, 1)] {
+            // Where several are too short the shortest says what would do.
+            let lengths = lines.iter().zip(&stations);
+            let lengths = lengths.map(|(line, (reaches, left))| ([*reaches, line.line.length() - left][end], line));
+            let Some((longest, line)) = lengths.min_by(|one, other| one.0.total_cmp(&other.0)) else { continue };
+            if longest < asked {
+                let arm = [line.entry, line.exit_arm][end];
+                let (arm, roundabout) = (self.ground.arms[arm].name.clone(), self.name.clone());
+                return Err(LeavesWorld { part, asked, longest, arm, roundabout, reason: line.ends[end].clone() });
+            }
+        }
         let mut routes = Vec::new();
-        for &Line { entry, lane, exit, exit_arm, ref line, crossing, ref ends, .. } in &self.ground.lines {
-            let (arm, exit_arm) = (&self.ground.arms[entry], &self.ground.arms[exit_arm]);
-            let leaves = |part, asked, longest, arm: &ground::Arm, end: &Option<String>| {
-                let (arm, roundabout, reason) = (arm.name.clone(), self.name.clone(), end.clone());
-                Err(LeavesWorld { part, asked, longest, arm, roundabout, reason })
-            };
-            let (reaches, left) = lane::ring_stations(line, self.ground.outer_radius);
+        for (&Line { entry, lane, exit, ref line, crossing, .. }, &(reaches, left)) in lines.iter().zip(&stations) {
+            let arm = &self.ground.arms[entry];
             let after = line.length() - left;
-            if reaches < approach {
-                return leaves("approach", approach, reaches, arm, &ends[0]);
-            }
-            if after < departure {
-                return leaves("departure", departure, after, exit_arm, &ends[1]);
-            }
             let centre_line = line.part(reaches - approach, left + departure);
             routes.push(Route {
                 name: format!("{}/{}-{}-{exit}", self.name, arm.name, lane.seen(self.is_mirrored()).name()),

@@ -1,9 +1,11 @@
 //! Lanes that pass beside a ring.
 
 use std::fs;
+use std::path::Path;
 
+use glam::DVec2;
 use offtrack::map::Road;
-use offtrack::map::opendrive::{Hand, Imported, Map};
+use offtrack::map::opendrive::{Hand, Imported, Map, exported};
 
 use crate::map_kinds::{arms, file, imported, parsed, plain};
 
@@ -41,4 +43,20 @@ fn a_bypass_that_comes_from_no_arm_is_left_out_with_a_warning() {
     assert_eq!((arms(&found), found.ground.lines.len()), (vec!["E", "N", "W", "S"], 16));
     let warning = found.warnings.iter().find(|warning| warning.contains("passes beside the ring")).unwrap();
     assert!(warning.ends_with("and is left out: it comes from the road of no arm"), "{warning}");
+}
+
+#[test]
+fn a_bypass_is_written_as_a_map_and_read_back_whatever_the_widths_of_its_lanes() {
+    let map = Map::read(&file("bypass_apart.xodr"), Hand::Map).unwrap();
+    for width in [3.5, 4.25] {
+        let mut ground = imported(&map).ground;
+        let outer = ground.outer_radius;
+        let bypass = ground.lines.iter_mut().find(|line| outer < line.line.distance(DVec2::ZERO)).unwrap();
+        bypass.widths[1] = width;
+        let text = exported(&Road::on("ring".to_owned(), ground)).unwrap();
+        let again = Map::parse(Path::new("again.xodr"), &text, Hand::Map).unwrap();
+        let lines = &imported(&again).ground.lines;
+        assert_eq!(lines.len(), 17);
+        assert_eq!(lines.iter().filter(|line| outer < line.line.distance(DVec2::ZERO)).count(), 1);
+    }
 }

@@ -159,7 +159,7 @@ fn bad_features_are_refused_by_their_number_and_what_would_do() {
         ),
         (Box::new(|f| f["features"][1]["geometry"]["coordinates"] = json!([])), "feature 2: coordinates: no positions"),
         (Box::new(|f| f["features"][0]["properties"] = Value::Null), "part KERB: none; a feature's property `part`"),
-        (Box::new(|f| f["features"][1]["properties"]["width"] = json!(0.0)), "feature 2: widths: 0 m"),
+        (Box::new(|f| f["features"][1]["properties"]["width"] = json!(0.0)), "feature 2: width: 0 m"),
         (Box::new(|f| f["features"][1]["properties"]["width"] = json!("4.5")), "feature 2: width: \"4.5\"; must be"),
         (Box::new(|f| f["features"][1]["properties"]["widths"] = json!([4, 4])), "feature 2: widths: [4,4]; must be"),
         (Box::new(|f| f["features"][1]["properties"]["widths"] = json!([4, 4, null])), "a list of three"),

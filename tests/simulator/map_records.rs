@@ -97,3 +97,27 @@ fn a_ring_that_is_nowhere_is_refused_by_its_key() {
     let said = Scenario::parse("mine", &text, None, &Loading::PLAIN).unwrap_err().to_string();
     assert!(said.contains("roundabout[0].ring[0]: NaN"), "{said}");
 }
+
+#[test]
+fn links_to_roads_that_there_are_not_and_to_neither_end_are_warned_of() {
+    let first = |key: &str, value: &str| {
+        let text = plain();
+        let at = text.find("<connection ").unwrap();
+        let from = at + text[at..].find(&format!("{key}=\"")).unwrap() + key.len() + 2;
+        let to = from + text[from..].find('"').unwrap();
+        warnings(&format!("{}{value}{}", &text[..from], &text[to..]))
+    };
+    for (key, value, expected) in [
+        ("connectingRoad", "77777", "its connectingRoad \"77777\" is no road; it is left out"),
+        ("incomingRoad", "x", "its incomingRoad \"x\" is no road; it is left out"),
+        ("contactPoint", "middle", "its contactPoint \"middle\" is neither start nor end; it counts as start"),
+    ] {
+        let said = first(key, value);
+        assert!(said.contains(expected), "{said}");
+    }
+    assert!(warnings(&plain()).is_empty());
+    let text = plain();
+    let width = text.find("<width ").unwrap();
+    let both = format!("{}<border sOffset=\"0\" a=\"1\" b=\"0\" c=\"0\" d=\"0\"/>{}", &text[..width], &text[width..]);
+    assert!(warnings(&both).contains("has width and border; the border is not read"), "{}", warnings(&both));
+}

@@ -131,7 +131,7 @@ fn wrong_flags_are_refused_with_what_would_do() {
     for (arguments, expected) in [
         (vec!["generate"], "--output"),
         (vec!["generate", "--count", "0", "-o", &output], "--count: 0; must lie in 1..100000"),
-        (vec!["generate", "--first", "4294967295", "-o", &output], "--first: 4294967295; must be at most 4294967275"),
+        (vec!["generate", "--first", "4294967295", "-o", &output], "--first: 4294967295; must be at most 4294967276"),
         (
             vec!["generate", "--distribution", "narrow", "-o", &output],
             "distribution: narrow; must be a path ending in .toml or one of mixed, wide",

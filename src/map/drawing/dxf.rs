@@ -107,7 +107,8 @@ impl Drawing {
                 continue;
             }
             let layer = text_of(entity, 8).unwrap_or_default();
-            if let Some(name) = text_of(entity, 2).filter(|name| entity[0].value == "INSERT" && blocks.contains(name)) {
+            let drawn_name = |name: &&str| entity[0].value == "INSERT" && blocks.contains(&folded(name));
+            if let Some(name) = text_of(entity, 2).filter(drawn_name) {
                 let found = format!("INSERT of {name}");
                 let place = format!("line {}", entity[0].line);
                 return Err(reader.invalid(place, found, "kerbs, lanes or aprons lie in this block: explode it"));
@@ -213,29 +214,36 @@ fn section<'a, 'b>(pairs: &'b [Pair<'a>], name: &str) -> Vec<&'b [Pair<'a>]> {
     starts.iter().zip(ends).map(|(&start, end)| &section[start..end]).collect()
 }
 
-/// Names of the blocks in which something is drawn on one of the layers, or in a block that is inserted there.
-fn drawn_blocks<'a>(pairs: &[Pair<'a>], layers: &Layers) -> HashSet<&'a str> {
-    let mut drawn: HashSet<&str> = HashSet::new();
-    let mut inserted: Vec<(&str, &str)> = Vec::new();
-    let mut block = "";
+/// A name in a DXF, which is the same in capitals.
+fn folded(name: &str) -> String {
+    name.to_lowercase()
+}
+
+/// Names of the blocks in which something is drawn on one of the layers, or in a block that is inserted there, all
+/// [`folded`].
+fn drawn_blocks(pairs: &[Pair], layers: &Layers) -> HashSet<String> {
+    let mut drawn: HashSet<String> = HashSet::new();
+    let mut inserted: Vec<(String, String)> = Vec::new();
+    let mut block = String::new();
+    let name_of = |entity: &[Pair]| folded(text_of(entity, 2).unwrap_or_default());
     for entity in section(pairs, "BLOCKS") {
         let layer = text_of(entity, 8).unwrap_or_default();
         let is_drawn = [&layers.kerbs, &layers.lanes, &layers.aprons].iter().any(|one| layer.eq_ignore_ascii_case(one));
         match entity[0].value {
-            "BLOCK" => block = text_of(entity, 2).unwrap_or_default(),
+            "BLOCK" => block = name_of(entity),
             // What stands on layer 0 of a block takes the layer of the insertion.
-            "INSERT" if is_drawn => drop(drawn.insert(block)),
-            "INSERT" => inserted.push((block, text_of(entity, 2).unwrap_or_default())),
+            "INSERT" if is_drawn => drop(drawn.insert(block.clone())),
+            "INSERT" => inserted.push((block.clone(), name_of(entity))),
             "LINE" | "ARC" | "CIRCLE" | "LWPOLYLINE" | "POLYLINE" | "SPLINE" | "ELLIPSE" if is_drawn => {
-                drawn.insert(block);
+                drawn.insert(block.clone());
             }
             _ => {}
         }
     }
     loop {
         let n = drawn.len();
-        let outer: Vec<&str> =
-            inserted.iter().filter(|(_, inner)| drawn.contains(inner)).map(|&(outer, _)| outer).collect();
+        let around = inserted.iter().filter(|(_, inner)| drawn.contains(inner));
+        let outer: Vec<String> = around.map(|(outer, _)| outer.clone()).collect();
         drawn.extend(outer);
         if drawn.len() == n {
             return drawn;

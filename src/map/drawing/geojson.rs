@@ -58,6 +58,9 @@ struct Geometry {
     coordinates: Value,
 }
 
+/// Widths of a lane on the entry, in the ring and on the exit, with the key that says them (m).
+type Widths = (&'static str, [f64; 3]);
+
 impl Feature {
     /// What the feature is.
     fn part(&self) -> &str {
@@ -65,15 +68,16 @@ impl Feature {
         NAMES.iter().find_map(|name| properties?.get(*name)?.as_str()).unwrap_or_default()
     }
 
-    /// The widths that a lane says: three, or one for all (m); an error names what is neither.
-    fn widths(&self) -> Result<Option<[f64; 3]>, (&'static str, &Value)> {
+    /// The widths that a lane says, three or one for all, with their key (m); an error names what is neither.
+    fn widths(&self) -> Result<Option<Widths>, (&'static str, &Value)> {
         let given = |key| self.properties.as_ref().and_then(|all| all.get(key)).filter(|value| !value.is_null());
         if let Some(width) = given("width") {
-            return width.as_f64().map(|width| Some([width; 3])).ok_or(("width", width));
+            return width.as_f64().map(|width| Some(("width", [width; 3]))).ok_or(("width", width));
         }
         let Some(widths) = given("widths") else { return Ok(None) };
         let numbers = widths.as_array().and_then(|all| all.iter().map(Value::as_f64).collect::<Option<Vec<f64>>>());
-        numbers.and_then(|numbers| numbers.try_into().ok()).map(Some).ok_or(("widths", widths))
+        let three = numbers.and_then(|numbers| numbers.try_into().ok());
+        three.map(|three| Some(("widths", three))).ok_or(("widths", widths))
     }
 }
 
@@ -217,10 +221,11 @@ impl Shape<'_> {
     }
 
     /// The centre lines of lanes.
-    fn lanes(&self, widths: Option<[f64; 3]>) -> Result<Vec<Entity>, Error> {
-        for width in widths.into_iter().flatten() {
-            self.reader.within(&format!("{}: widths", self.place), width, 1.0..=20.0, "m")?;
+    fn lanes(&self, given: Option<Widths>) -> Result<Vec<Entity>, Error> {
+        for (key, width) in given.iter().flat_map(|(key, widths)| widths.iter().map(move |width| (key, *width))) {
+            self.reader.within(&format!("{}: {key}", self.place), width, 1.0..=20.0, "m")?;
         }
+        let widths = given.map(|(_, widths)| widths);
         let lines = self.lines(&["LineString", "MultiLineString"])?;
         lines.into_iter().map(|(key, points)| self.entity(&key, straight(&points), false, widths)).collect()
     }

@@ -170,15 +170,34 @@ impl Source<'_, '_> {
             // A direct junction joins roads without one between them.
             let direct =
                 connection.attribute("connectingRoad").is_none() && connection.attribute("linkedRoad").is_some();
+            let connecting = if direct { "linkedRoad" } else { "connectingRoad" };
+            for key in ["incomingRoad", connecting] {
+                let id = attribute(connection, key);
+                if !self.records.by_id.contains_key(id) {
+                    self.warn(connection, &format!("its {key} \"{}\" is no road; it is left out", shown(id)));
+                }
+            }
             connections.push(Connection {
                 incoming: attribute(connection, "incomingRoad").to_owned(),
-                connecting: attribute(connection, if direct { "linkedRoad" } else { "connectingRoad" }).to_owned(),
-                at_start: attribute(connection, "contactPoint") != "end",
+                connecting: attribute(connection, connecting).to_owned(),
+                at_start: self.is_at_start(connection),
                 lanes,
                 direct,
             });
         }
         Ok(connections)
+    }
+
+    /// Whether a link or a connection touches the beginning of its road; one that says neither end is warned of.
+    fn is_at_start(&mut self, node: Node) -> bool {
+        let point = attribute(node, "contactPoint");
+        if !["start", "end"].contains(&point) {
+            self.warn(
+                node,
+                &format!("its contactPoint \"{}\" is neither start nor end; it counts as start", shown(point)),
+            );
+        }
+        point != "end"
     }
 
     /// Whether most of the map's roads have left-hand traffic.
@@ -205,7 +224,7 @@ impl Source<'_, '_> {
     fn road_link(&mut self, node: Node) -> Option<Link> {
         let id = attribute(node, "elementId").to_owned();
         match attribute(node, "elementType") {
-            "road" => Some(Link::RoadRecord(id, attribute(node, "contactPoint") != "end")),
+            "road" => Some(Link::RoadRecord(id, self.is_at_start(node))),
             "junction" => Some(Link::Junction(id)),
             other => {
                 let other = shown(other);

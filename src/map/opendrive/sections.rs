@@ -96,6 +96,9 @@ impl Source<'_, '_> {
         }
         heights.sort_by(|one, other| one.start.total_cmp(&other.start));
         let bordered = widths.is_empty() && !borders.is_empty();
+        if !widths.is_empty() && !borders.is_empty() {
+            self.warn(node, "has width and border; the border is not read");
+        }
         if widths.is_empty() && borders.is_empty() {
             self.warn(node, "has neither width nor border; it counts as having none");
         }

@@ -128,15 +128,15 @@ fn reach(reader: &Reader, seen: &Ground, lanes: &[ArmLane]) -> Result<f64, Error
     }
 }
 
-/// Stations at which a line that begins and ends outside enters and leaves the circle of a radius (m).
+/// Stations at which a line that begins and ends outside enters and leaves the circle of a radius; of one that hardly
+/// comes there, or not at all, stations around the nearest (m).
 fn inside(line: &Curve, radius: f64) -> [f64; 2] {
     let n = (line.length() / STEP).ceil().max(1.0);
     let station = |i: usize| line.length() * i as f64 / n;
     let is_inside = |s: f64| line.point_at(s).length() < radius;
     let within: Vec<usize> = (0..=n as usize).filter(|&i| is_inside(station(i))).collect();
     let (Some(&first), Some(&last)) = (within.first(), within.last()) else {
-        let nearest = line.station(DVec2::ZERO);
-        return [nearest, nearest];
+        return around(line, line.station(DVec2::ZERO));
     };
     let between = |mut outside: f64, mut inner: f64| {
         for _ in 0..50 {
@@ -145,10 +145,16 @@ fn inside(line: &Curve, radius: f64) -> [f64; 2] {
         }
         outside
     };
-    [
-        between(station(first.saturating_sub(1)), station(first)),
-        between(station((last + 1).min(n as usize)), station(last)),
-    ]
+    let reaches = between(station(first.saturating_sub(1)), station(first));
+    let leaves = between(station((last + 1).min(n as usize)), station(last));
+    if leaves - reaches < 2.0 * BEYOND { around(line, 0.5 * (reaches + leaves)) } else { [reaches, leaves] }
+}
+
+/// Stations around one, with lanes of arms before and behind them (m).
+fn around(line: &Curve, station: f64) -> [f64; 2] {
+    let least = SHORTEST + BEYOND;
+    let middle = station.clamp(least, (line.length() - least).max(least));
+    [middle - BEYOND, (middle + BEYOND).min(line.length())]
 }
 
 /// The widths of a lane of this length whose width is that of its entry arm at its beginning, that of the ring between
