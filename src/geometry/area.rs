@@ -105,6 +105,21 @@ impl Area {
         Area { parts: self.parts.iter().map(part).filter(|part: &Part| !part.is_empty()).collect() }
     }
 
+    /// The area by contours that do not cross themselves, without spikes narrower than `tolerance`, and without those of
+    /// less than a size (m, m²).
+    pub(crate) fn tidied(&self, tolerance: f64, smallest: f64) -> Area {
+        let spikeless = |area: &Area| {
+            let part = |part: &Part| part.iter().map(|contour| without_spikes(contour, tolerance)).collect();
+            Area { parts: area.parts.iter().map(part).collect() }
+        };
+        let mut area = spikeless(&spikeless(self).plus(&Area::default()));
+        for part in &mut area.parts {
+            part.retain(|contour| smallest <= signed_area(contour).abs());
+        }
+        area.parts.retain(|part| !part.is_empty());
+        area
+    }
+
     /// The area with every gap closed that is narrower than `width`, a tenth of it uncertain (m).
     pub(crate) fn closed(&self, width: f64) -> Area {
         // Fewer points make this several times as fast; what they add at most is shrunk away again.
@@ -160,6 +175,26 @@ fn simplified(contour: &[[f64; 2]], tolerance: f64) -> Vec<[f64; 2]> {
     kept
 }
 
+/// A contour without the points at which it turns back, the next edge within `tolerance` of the last one or the other way
+/// round.
+fn without_spikes(contour: &[[f64; 2]], tolerance: f64) -> Vec<[f64; 2]> {
+    let mut kept = contour.to_vec();
+    let (mut at, mut n_passed) = (0, 0);
+    while 3 < kept.len() && n_passed < kept.len() {
+        let n = kept.len();
+        let [before, tip, after] = [at + n - 1, at, at + 1].map(|i| DVec2::from(kept[i % n]));
+        let near = |edge: [DVec2; 2], p: DVec2| Piece::Segment { from: edge[0], to: edge[1] }.distance(p) < tolerance;
+        let turns_back = (tip - before).dot(after - tip) < 0.0;
+        if turns_back && (near([before, tip], after) || near([tip, after], before)) {
+            kept.remove(at);
+            (at, n_passed) = (at.saturating_sub(1), 0);
+        } else {
+            (at, n_passed) = ((at + 1) % n, n_passed + 1);
+        }
+    }
+    kept
+}
+
 /// What a rule makes of two sets of contours.
 fn overlaid<R: ShapeResource<[f64; 2]>>(subject: &R, clip: &R, rule: OverlayRule) -> Vec<Part> {
     // The grid reaches 65 km from the middle; a map that is larger has a coarser one.
@@ -195,6 +230,23 @@ mod tests {
         assert!(simple.parts[0][0].len() < 200 && (simple.size() - whole.size()).abs() < 0.003 * 63.0);
         // Corners stay.
         assert_eq!(Area::union(std::iter::once(square(0.0, 0.0, 1.0))).simplified(0.1).parts[0][0].len(), 4);
+    }
+
+    #[test]
+    fn a_contour_that_crosses_itself_is_tidied_into_those_that_do_not_and_slivers_go() {
+        // A square whose lower side goes back and forth, and dips below itself.
+        let outer =
+            vec![[0.0, 0.0], [0.6, 0.0], [0.4, 0.0], [0.5, 0.004], [0.45, -0.004], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+        let sliver = vec![[3.0, 0.0], [4.0, 0.0], [4.0, 1e-3]];
+        let area = Area { parts: vec![vec![outer], vec![sliver]] }.tidied(0.005, 1e-3);
+        assert_eq!((area.parts.len(), area.parts[0].len()), (1, 1));
+        assert!((area.size() - 1.0).abs() < 2e-3, "{}", area.size());
+        let contour = points(&area.parts[0][0]);
+        let n = contour.len();
+        let edge = |i: usize| Piece::Segment { from: contour[i], to: contour[(i + 1) % n] };
+        let apart = |i: usize, j: usize| 1 < j - i && (i, j) != (0, n - 1);
+        let pairs = (0..n).flat_map(|i| (i + 1..n).map(move |j| (i, j))).filter(|&(i, j)| apart(i, j));
+        assert!(pairs.into_iter().all(|(i, j)| edge(i).meetings(&edge(j)).is_empty()), "{contour:?}");
     }
 
     #[test]

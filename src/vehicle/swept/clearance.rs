@@ -11,6 +11,8 @@ const BETWEEN_POINTS: f64 = 0.05;
 const HIDDEN: f64 = 0.002;
 /// Largest distance of a swept area's corner that is left out from the edge without it (m).
 const SIMPLIFIED: f64 = 0.005;
+/// Parts and holes that are smaller are left out (m²).
+const SMALLEST: f64 = 1e-3;
 
 /// How near a unit comes to the kerbs along a path.
 #[derive(Debug, Clone, PartialEq)]
@@ -86,7 +88,14 @@ pub fn swept_area(path: &[[DVec2; 4]]) -> Vec<Vec<DVec2>> {
         let middle = path.len() / 2;
         united(&path[..=middle]).plus(&united(&path[middle..]))
     }
-    united(path).simplified(SIMPLIFIED).parts.iter().flatten().map(|contour| points(contour)).collect()
+    united(path)
+        .simplified(SIMPLIFIED)
+        .tidied(SIMPLIFIED, SMALLEST)
+        .parts
+        .iter()
+        .flatten()
+        .map(|contour| points(contour))
+        .collect()
 }
 
 /// What a rectangle sweeps between two poses: itself at both, and what each side sweeps. Their hull would fill what
