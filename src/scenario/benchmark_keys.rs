@@ -203,8 +203,7 @@ pub(super) struct WrittenActions {
     pub(super) kind: ActionKind,
     pub(super) steer_levels: Option<Vec<f64>>,
     pub(super) speeds_kmh: Vec<f64>,
-    #[serde(default)]
-    pub(super) speed_changes_kmh: Vec<f64>,
+    pub(super) speed_changes_kmh: Option<Vec<f64>>,
 }
 
 #[derive(Deserialize)]

@@ -76,9 +76,9 @@ fn without_routes(
             "at least one is needed, or no truck moves",
         ));
     }
-    let speed_changes = match actions.speed_changes_kmh.as_slice() {
-        [] => Vec::new(),
-        changes => numbers(reader, "actions.speed_changes_kmh", changes, 90.0, -90.0, "km/h")?,
+    let speed_changes = match &actions.speed_changes_kmh {
+        None => Vec::new(),
+        Some(changes) => numbers(reader, "actions.speed_changes_kmh", changes, 90.0, -90.0, "km/h")?,
     };
     written.reward.check(reader)?;
     Ok(Scenario {

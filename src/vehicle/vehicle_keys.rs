@@ -195,13 +195,19 @@ fn tractor(reader: &Reader, written: &WrittenTractor) -> Result<Tractor, Error> 
 }
 
 fn trailer(reader: &Reader, written: &WrittenTrailer) -> Result<Trailer, Error> {
-    Ok(Trailer {
+    let trailer = Trailer {
         // Slip shortens this lever by up to `model.slip_lever`: it stays well positive.
         wheelbase: reader.within("trailer.wheelbase", written.wheelbase, TRAILER_WHEELBASE, "m")?,
         kingpin_to_front: reader.within("trailer.kingpin_to_front", written.kingpin_to_front, KINGPIN_TO_FRONT, "m")?,
         kingpin_to_rear: reader.within("trailer.kingpin_to_rear", written.kingpin_to_rear, KINGPIN_TO_REAR, "m")?,
         width: reader.within("trailer.width", written.width, 1.0..=4.0, "m")?,
-    })
+    };
+    if trailer.kingpin_to_rear < trailer.wheelbase {
+        let found = format!("{} m", trailer.kingpin_to_rear);
+        let expected = format!("its axles would be behind it: must be at least the wheelbase, {} m", trailer.wheelbase);
+        return Err(reader.invalid("trailer.kingpin_to_rear", found, expected));
+    }
+    Ok(trailer)
 }
 
 fn load(reader: &Reader, key: &str, written: &WrittenLoad) -> Result<Load, Error> {
@@ -260,10 +266,11 @@ pub(crate) fn model(reader: &Reader, key: &str, written: &WrittenModel, trailer:
 
 fn sensors(reader: &Reader, written: &WrittenSensors, tractor: &Tractor, trailer: &Trailer) -> Result<Sensors, Error> {
     let length = trailer.kingpin_to_front + trailer.kingpin_to_rear;
-    let trailer_first =
-        reader.within("sensors.trailer_first", written.trailer_first.unwrap_or(0.0), 0.0..=length, "m")?;
-    let trailer_last =
-        reader.within("sensors.trailer_last", written.trailer_last.unwrap_or(length), trailer_first..=length, "m")?;
+    // As decimals add up: the sum of floats may lie below it.
+    let end = length.max((length * 1e9).round() / 1e9);
+    let within = |name, value: f64, from| reader.within(name, value, from..=end, "m").map(|at| at.min(length));
+    let trailer_first = within("sensors.trailer_first", written.trailer_first.unwrap_or(0.0), 0.0)?;
+    let trailer_last = within("sensors.trailer_last", written.trailer_last.unwrap_or(length), trailer_first)?;
     let front = tractor.wheelbase + tractor.front_overhang;
     let mut tractor_mounts = [DVec2::new(front, 0.0); N_TRACTOR_RAYS];
     if let Some(mounts) = &written.tractor_mounts {

@@ -128,11 +128,23 @@ fn a_wrong_vehicle_file_is_refused_with_its_key_its_value_and_what_would_do() {
             "sensors.trailer_last: 3 m; must lie in 8..13.7",
         ),
         (
+            "kingpin_to_rear = 11.62",
+            "kingpin_to_rear = 7.0",
+            "trailer.kingpin_to_rear: 7 m; its axles would be behind it: must be at least the wheelbase, 7.756 m",
+        ),
+        (
             "[loads.empty]",
             "[speed_control]\ngain = 0.0\n[loads.empty]",
             "speed_control.gain: 0 1/s; must lie in 0.01..10 1/s",
         ),
     ];
+    // The sum of the trailer's two lengths as decimals is the last place.
+    let text = std::fs::read_to_string(vehicle_file("daf_xf")).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("truck.toml");
+    std::fs::write(&file, text.replacen("[loads.empty]", "[sensors]\ntrailer_last = 13.71\n[loads.empty]", 1)).unwrap();
+    let (as_shipped, at_end) = (Vehicle::read(&vehicle_file("daf_xf")).unwrap(), Vehicle::read(&file).unwrap());
+    assert_eq!(at_end.sensors.trailer_last, as_shipped.sensors.trailer_last);
     for (from, to, expected) in wrong {
         let message = refusal(from, to);
         assert!(message.contains("truck.toml") && message.contains(expected), "{message}");
