@@ -129,6 +129,19 @@ def numbers(name: str, value: npt.ArrayLike, needed: str) -> npt.NDArray[Any]:
     return found
 
 
+def real(value: object) -> float:
+    """A number as a float; texts and booleans, which ``float`` takes, are none."""
+    if not isinstance(value, int | float | np.integer | np.floating) or isinstance(value, bool):
+        raise TypeError
+    return float(value)
+
+
+def single(found: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
+    """Numbers as float32; those beyond it are infinite, without a warning."""
+    with np.errstate(over="ignore"):
+        return found.astype(np.float32, copy=False)
+
+
 def is_sequence(given: object) -> TypeGuard[Sequence[Any]]:
     """Whether things stand in an order, one for each truck: not a text, a set or a dict."""
     return isinstance(given, Sequence | np.ndarray) and not isinstance(given, str) and getattr(given, "ndim", 1) > 0

@@ -20,6 +20,7 @@ from .arguments import (
     mode_name,
     names_of,
     numbers,
+    real,
     stream_of,
     text,
     weights_of,
@@ -276,14 +277,14 @@ class Batch(_offtrack.Batch):
         checked: list[tuple[int, int] | None] | None = None
         if seeds is not None:
             checked = [
-                None if seed is None else (within(f"seeds[{index}]", seed, 0, 2**32), 0)
-                for index, seed in enumerate(seeds)
+                None if seed is None else (within(f"seeds[{env}]", seed, 0, 2**32), 0)
+                for env, seed in zip(indices, seeds)
             ]
         elif streams is not None:
-            checked = [stream_of(f"streams[{index}]", stream) for index, stream in enumerate(streams)]
+            checked = [stream_of(f"streams[{env}]", stream) for env, stream in zip(indices, streams)]
         if routes is not None:
-            routes = [None if name is None else text(f"routes[{index}]", name) for index, name in enumerate(routes)]
-        stated = None if starts is None else [self._start(index, start) for index, start in enumerate(starts)]
+            routes = [None if name is None else text(f"routes[{env}]", name) for env, name in zip(indices, routes)]
+        stated = None if starts is None else [self._start(env, start) for env, start in zip(indices, starts)]
         self.begin_episodes(indices, checked, routes, stated)
 
     def weigh(self, weights: Mapping[str, float]) -> None:
@@ -340,7 +341,7 @@ class Batch(_offtrack.Batch):
             return None
         try:
             start = Start(*given)
-            offset, heading, speed, along = (float(fraction) for fraction in (*start[:3], start.along))
+            offset, heading, speed, along = (real(fraction) for fraction in (*start[:3], start.along))
         except (TypeError, ValueError):
             needed = "a tuple of offset, heading error, speed, vehicle and along is needed, see offtrack_sim.Start"
             raise TypeError(f"starts[{index}]: {given!r}; {needed}") from None

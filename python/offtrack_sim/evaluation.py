@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _offtrack
-from .arguments import check_commands, checked_integer, checked_seed, device_name, numbers
+from .arguments import check_commands, checked_integer, checked_seed, device_name, numbers, single
 from .batch import Batch
 from .layout import Ended
 from .policy import Policy
@@ -101,7 +101,8 @@ class Evaluation:
         return {ended.name.lower(): counted[ended] for ended in Ended if counted[ended]}
 
     def as_dict(self) -> dict[str, Any]:
-        """The same for a JSON file, with the keys of ``offtrack evaluate --json``."""
+        """The same for a JSON file, with the keys of ``offtrack evaluate --json``; ``routes`` has the success of each
+        route by its name, where the command lists records."""
         low, high = self.success_interval
         over_routes = self.success_interval_over_routes
         ends = {} if over_routes is None else {"low": over_routes[0], "high": over_routes[1]}
@@ -218,7 +219,7 @@ def _checked(actions: Any, n: int, n_commands: int) -> npt.NDArray[Any]:
         if found.dtype.kind != "f" or found.shape != (n, n_commands):
             needed = f"float32 of shape ({n}, {n_commands}) is needed"
             raise TypeError(f"policy: gave {found.dtype} of shape {found.shape}; {needed}")
-        rounded = found.astype(np.float32, copy=False)
+        rounded = single(found)
         # The batch judges what it is given; what rounding would hide from it is judged here.
         check_commands("actions", np.where(abs(rounded) <= 1, found, 0.0))
         return rounded

@@ -69,7 +69,7 @@ class RoundaboutParallel(ParallelEnv[str, Observation, Any]):
         render_size: int = 480,
         device: str = "cpu",
     ) -> None:
-        check_render_mode(render_mode)
+        check_render_mode(render_mode, render_size)
         n_trucks = within("n_trucks", n_trucks, 1, MOST_TRUCKS + 1)
         scenario = whole(scenario)
         if "traffic" not in scenario.keys:

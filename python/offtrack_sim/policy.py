@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _offtrack
-from .arguments import checked_integer, file_name, numbers
+from .arguments import checked_integer, file_name, numbers, single
 from .layout import EXTRAS
 
 if TYPE_CHECKING:
@@ -217,4 +217,4 @@ class Driver:
 def _rows(observations: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
     """Observations as the network takes them."""
     found = numbers("observations", observations, "an array of numbers, [n, n_values], is needed")
-    return np.ascontiguousarray(found, dtype=np.float32)
+    return np.ascontiguousarray(single(found))

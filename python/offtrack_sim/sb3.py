@@ -77,7 +77,7 @@ class RoundaboutVecEnv(VecEnv):
         max_episode_steps: int | None = None,
         weights: Mapping[str, float] | None = None,
     ) -> None:
-        check_render_mode(render_mode)
+        check_render_mode(render_mode, render_size)
         if seed is None:
             seed = int(np.random.SeedSequence().generate_state(1)[0])
         self.batch = Batch(

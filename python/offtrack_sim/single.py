@@ -11,7 +11,7 @@ import gymnasium
 import numpy as np
 import numpy.typing as npt
 
-from .arguments import check_commands, checked_seed
+from .arguments import check_commands, checked_seed, within
 from .batch import Batch
 from .layout import EXTRAS, OBSERVATION, VEHICLES, Ended
 from .scenarios import Scenario
@@ -77,7 +77,7 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], Any]):
         numeric_infos: bool = False,
         weights: Mapping[str, float] | None = None,
     ) -> None:
-        check_render_mode(render_mode)
+        check_render_mode(render_mode, render_size)
         self.batch = Batch(
             scenario,
             1,
@@ -161,8 +161,9 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], Any]):
         return None if self.render_mode is None else self.batch.render(0, self.render_size)
 
 
-def check_render_mode(render_mode: str | None) -> None:
-    """An error for a mode that no environment of this package has."""
+def check_render_mode(render_mode: str | None, render_size: int) -> None:
+    """An error for a mode that no environment of this package has, and for a size that no picture has."""
+    within("render_size", render_size, 64, 4097)
     if render_mode not in (None, "rgb_array"):
         raise ValueError(
             f'render_mode: {render_mode!r}; must be None or "rgb_array" (for a window: HumanRendering of gymnasium)'

@@ -76,7 +76,7 @@ class RoundaboutVector(Base):
                 f"gymnasium {gymnasium.__version__}: vector environments need 1.1 or later; Roundabout and Batch do not"
             )
             raise ImportError(message)
-        check_render_mode(render_mode)
+        check_render_mode(render_mode, render_size)
         mode = "next_step" if autoreset_mode is None else mode_name("autoreset_mode", autoreset_mode)
         if seed is None:
             seed = int(np.random.SeedSequence().generate_state(1)[0])

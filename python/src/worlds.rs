@@ -11,7 +11,7 @@ use offtrack::files::cache::{Cache, Loading, Stopped};
 use offtrack::files::reader::Reader;
 use offtrack::files::shipped::{FILES, Kind};
 use offtrack::layout::Action;
-use offtrack::scenario::{Scenario, Split};
+use offtrack::scenario::{ActionKind, Scenario, Split};
 use offtrack::world::{Error, World};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -177,9 +177,20 @@ pub fn scenario_of_keys(keys: &str) -> PyResult<String> {
     toml::to_string(&keys).map_err(|error| wrong(&error))
 }
 
-/// A benchmark's name, its action table, the names of the extras that it observes, and whether it observes other
-/// vehicles.
-type Table = (String, Vec<Action>, Vec<&'static str>, bool);
+/// What a policy must know of a benchmark.
+#[derive(Debug, Clone)]
+pub struct Table {
+    /// The benchmark's name.
+    pub benchmark: String,
+    /// What its actions ask for.
+    pub actions: Vec<Action>,
+    /// Whether they are commands.
+    pub is_continuous: bool,
+    /// Names of the extras that it observes.
+    pub extras: Vec<&'static str>,
+    /// Whether it observes other vehicles.
+    pub vehicles: bool,
+}
 
 /// What a policy file says of a benchmark.
 pub fn policy_table(scenario: &Given, stop: &AtomicBool) -> PyResult<Table> {
@@ -188,5 +199,11 @@ pub fn policy_table(scenario: &Given, stop: &AtomicBool) -> PyResult<Table> {
     let scenario = scenario.load(&loading)?;
     let substep = (scenario.step / f64::from(scenario.n_substeps)) as f32;
     let rig = scenario.vehicle.rig(&scenario.load, substep, scenario.steer_max);
-    Ok((scenario.name.clone(), scenario.actions(rig.steer_max), scenario.extras.names(), scenario.observes_vehicles))
+    Ok(Table {
+        benchmark: scenario.name.clone(),
+        actions: scenario.actions(rig.steer_max),
+        is_continuous: scenario.action_kind == ActionKind::Continuous,
+        extras: scenario.extras.names(),
+        vehicles: scenario.observes_vehicles,
+    })
 }

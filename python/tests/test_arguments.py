@@ -312,3 +312,40 @@ def test_a_shorter_time_limit_truncates_as_gymnasiums_wrapper_does() -> None:
     # The benchmark's own limit stands where it is the shorter one, and in another batch of the same benchmark.
     assert Batch(max_episode_steps=None).fingerprint() == Batch(max_episode_steps=10**6).fingerprint()
     assert Batch(max_episode_steps=5).fingerprint() != Batch().fingerprint()
+
+
+@pytest.mark.parametrize("start", ["11", ("0.5", "-0.5"), (True, False), [np.bool_(True), 0.0]])
+def test_texts_and_booleans_are_no_starts(start: Any) -> None:
+    batch = Batch("attard2023", 4)
+    with pytest.raises(TypeError, match=r"starts\[2\]: .*; a tuple of offset, heading error, speed"):
+        batch.begin([2], starts=[start])
+
+
+def test_a_masked_reset_names_the_truck_whose_route_or_start_is_wrong() -> None:
+    env = offtrack_sim.make_vec("attard2023", 3)
+    env.reset(seed=1)
+    mask = np.array([False, False, True])
+    for key, wrong in [("routes", 5), ("starts", "xyz"), ("starts", (2.0, 0))]:
+        with pytest.raises((TypeError, ValueError), match=rf"{key}\[2\]"):
+            env.reset(options={"reset_mask": mask, key: [None, None, wrong]})
+
+
+@pytest.mark.filterwarnings("error")
+def test_numbers_beyond_float32_are_refused_without_a_warning() -> None:
+    observer = offtrack_sim.Observer("attard2023", ["20m/E-left-2"])
+    position, heading = np.zeros((1, 2)), np.zeros(1)
+    observer.begin(position, heading, heading, 8.0)
+    for call in (
+        lambda: Policy.shipped().act(np.full((1, 69), 1e39)),
+        lambda: observer.observe(position, heading, heading, 8.0, acceleration=1e39),
+        lambda: offtrack_sim.speed_control(observer, 8.0, 1e39),
+    ):
+        with pytest.raises(ValueError, match="inf"):
+            call()
+
+
+def test_a_policy_of_levels_is_not_written_for_a_benchmark_that_takes_commands(tmp_path: Path) -> None:
+    layers = [(np.zeros((77, 2), np.float32), np.zeros(2, np.float32))]
+    with pytest.raises(ValueError, match="squash: None; laden2026-continuous takes commands: give tanh or clip"):
+        export.save(tmp_path / "policy.safetensors", layers, scenario="laden2026-continuous")
+    assert not list(tmp_path.iterdir())

@@ -180,3 +180,11 @@ def test_films_are_recorded_of_one_truck_and_of_many(tmp_path: Path) -> None:
     for folder in ("one", "many"):
         found = list((tmp_path / folder).glob("*.mp4"))
         assert len(found) == 1 and 1000 < found[0].stat().st_size
+
+
+def test_a_size_that_no_picture_has_is_refused_before_there_are_trucks() -> None:
+    for make in (offtrack_sim.make_vec, offtrack_sim.RoundaboutVector):
+        with pytest.raises(ValueError, match=r"^render_size: 10; must lie in 64\.\.4097"):
+            make("attard2023", 2, render_mode="rgb_array", render_size=10)
+    with pytest.raises(ValueError, match=r"^render_size: 5000; must lie in 64\.\.4097"):
+        offtrack_sim.Roundabout("attard2023", render_mode="rgb_array", render_size=5000)

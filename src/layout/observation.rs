@@ -44,12 +44,22 @@ pub struct Values {
 /// Waypoints ahead are the next one and the 2nd, 5th, 7th and 10th after it.
 pub const OBSERVATION: [Values; 13] = numbered::<13, N_VALUES>([
     values("speed", 1, "speed of the drive axle / 27.8 m/s, limited to 0..1"),
-    values("waypoint_distance", 2, "distance to the next and the following waypoint / 20 m, at most 1"),
+    values(
+        "waypoint_distance",
+        2,
+        "distance of the middle of the tractor's wheelbase from the next and the following waypoint / 20 m, at most 1; \
+         the last one of a route repeats",
+    ),
     values("crossing_distance", 2, "distance to the crossing lines of these waypoints / 20 m, at most 1"),
     values("lane_distance", 1, "distance to the lane's centre line / 10 m, at most 1"),
-    angles("bearing", 5, "angle at the waypoint behind, from a waypoint ahead to the truck / pi"),
-    angles("heading", 5, "tractor's heading less the lane's at these waypoints / pi"),
-    angles("trailer_heading", 5, "trailer's heading less the lane's at these waypoints / pi"),
+    angles(
+        "bearing",
+        5,
+        "angle at the waypoint behind, from the next one, and the 2nd, 5th, 7th and 10th after it, to the middle of the \
+         tractor's wheelbase / pi",
+    ),
+    angles("heading", 5, "tractor's heading less the lane's at the waypoints ahead of the bearings / pi"),
+    angles("trailer_heading", 5, "trailer's heading less the lane's at the waypoints ahead of the bearings / pi"),
     angles("articulation", 1, "tractor's heading less the trailer's / pi"),
     values(
         "future_curvature",

@@ -15,6 +15,7 @@ use pyo3::types::PyDict;
 use super::refused;
 use crate::errors::guarded;
 use crate::pool::Pool;
+use crate::worlds::Table;
 use crate::{observed, worlds};
 
 /// Weights and biases of a layer.
@@ -47,9 +48,8 @@ pub struct Given<'py> {
 #[pyfunction]
 pub fn write_policy(py: Python, file: &str, scenario: worlds::Given, network: Given) -> PyResult<()> {
     guarded(|| {
-        let (benchmark, actions, extras, vehicles) =
-            Pool::new(0).run_until_signal(py, |stop| worlds::policy_table(&scenario, stop))??;
-        let policy = network.policy(file, (benchmark, actions), (&extras, vehicles))?;
+        let table = Pool::new(0).run_until_signal(py, |stop| worlds::policy_table(&scenario, stop))??;
+        let policy = network.policy(file, table)?;
         let bytes = policy.to_bytes();
         // What is written can be read: sizes that do not fit the benchmark and values that cannot be are found here.
         Policy::from_bytes(file, &bytes).map_err(refused)?;
@@ -58,23 +58,23 @@ pub fn write_policy(py: Python, file: &str, scenario: worlds::Given, network: Gi
 }
 
 impl Given<'_> {
-    fn policy(
-        &self,
-        file: &str,
-        (benchmark, actions): (String, Vec<Action>),
-        (extras, vehicles): (&[&str], bool),
-    ) -> PyResult<Policy> {
+    fn policy(&self, file: &str, table: Table) -> PyResult<Policy> {
+        let Table { benchmark, actions, is_continuous, extras, vehicles } = table;
         let activation = word::<Activation>("activation", &self.activation)?;
         let head = match &self.squash {
             None => Head::Levels,
             Some(squash) => Head::Continuous { squash: word::<Squash>("squash", squash)? },
         };
+        if self.squash.is_none() && is_continuous {
+            let message = format!("squash: None; {benchmark} takes commands: give tanh or clip");
+            return Err(PyValueError::new_err(message));
+        }
         let padding = word::<Padding>("padding", &self.padding)?;
         let gates = self.gates.as_ref().map(|gates| word::<Gates>("gates", gates)).transpose()?;
         let selected = |names: &Vec<String>| Selection::of(names);
         let values = self.values.as_ref().map(selected).transpose();
         let values = values.map_err(|message| PyValueError::new_err(format!("values: {message}")))?;
-        let (extras, vehicles) = if values.is_none() { (extras, vehicles) } else { (&[][..], false) };
+        let (extras, vehicles) = if values.is_none() { (&extras[..], vehicles) } else { (&[][..], false) };
         let n_beside = extras.len() + if vehicles { N_AROUND } else { 0 };
         let n_values = values.as_ref().map_or(N_VALUES + n_beside, |values| values.indices().len());
         let n_stacked = n_values.saturating_mul(self.frames);
