@@ -105,8 +105,8 @@ impl Area {
         Area { parts: self.parts.iter().map(part).filter(|part: &Part| !part.is_empty()).collect() }
     }
 
-    /// The area by contours that do not cross themselves, without spikes narrower than `tolerance`, and without those of
-    /// less than a size (m, m²).
+    /// The area by contours that do not cross themselves, without spikes narrower than `tolerance`, and without contours
+    /// of less than a size (m, m²).
     pub(crate) fn tidied(&self, tolerance: f64, smallest: f64) -> Area {
         let spikeless = |area: &Area| {
             let part = |part: &Part| part.iter().map(|contour| without_spikes(contour, tolerance)).collect();
@@ -175,8 +175,8 @@ fn simplified(contour: &[[f64; 2]], tolerance: f64) -> Vec<[f64; 2]> {
     kept
 }
 
-/// A contour without the points at which it turns back, the next edge within `tolerance` of the last one or the other way
-/// round.
+/// A contour without the points at which it turns back while the next edge lies within `tolerance` of the last one, or
+/// the last one of the next (m).
 fn without_spikes(contour: &[[f64; 2]], tolerance: f64) -> Vec<[f64; 2]> {
     let mut kept = contour.to_vec();
     let (mut at, mut n_passed) = (0, 0);

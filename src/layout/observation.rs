@@ -55,8 +55,8 @@ pub const OBSERVATION: [Values; 13] = numbered::<13, N_VALUES>([
     angles(
         "bearing",
         5,
-        "angle at the waypoint behind, from the next one, and the 2nd, 5th, 7th and 10th after it, to the middle of the \
-         tractor's wheelbase / pi",
+        "angle at the waypoint behind, from the next one, and the 2nd, 5th, 7th and 10th after it, to the middle of \
+         the tractor's wheelbase / pi",
     ),
     angles("heading", 5, "tractor's heading less the lane's at the waypoints ahead of the bearings / pi"),
     angles("trailer_heading", 5, "trailer's heading less the lane's at the waypoints ahead of the bearings / pi"),

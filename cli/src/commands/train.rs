@@ -107,13 +107,14 @@ fn check_settings(args: &Args) -> Result<(), Error> {
         ("--from", args.from.is_some(), "from"),
         ("--adapter", args.adapter.is_some(), "adapter"),
     ];
-    let key_of = |setting: &'_ String| setting.split_once('=').map(|(key, _)| key.trim().to_owned());
+    fn key_of(setting: &str) -> Option<&str> {
+        setting.split_once('=').map(|(key, _)| key.trim())
+    }
     for (index, setting) in args.settings.iter().enumerate() {
         let key = key_of(setting);
         if let Some(other) = args.settings[..index].iter().find(|other| key.is_some() && key_of(other) == key) {
             return Err(Error::setting("--set", setting, format!("{other} is given, too: leave one of them out")));
         }
-        let key = key.as_deref();
         if let Some((flag, ..)) = flags.iter().find(|(_, is_given, own)| *is_given && Some(*own) == key) {
             return Err(Error::setting("--set", setting, format!("{flag} is given, too: leave one of them out")));
         }
