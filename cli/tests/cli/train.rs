@@ -56,8 +56,10 @@ fn a_run_is_never_written_over() {
     std::fs::create_dir_all(place.file("runs").join("tiny-1")).unwrap();
     assert!(place.train(&["--steps", "800"]).status.success());
     assert!(place.file("runs").join("tiny-2").join("policy.safetensors").is_file());
-    let message = refusal(&place.train(&["--name", "../elsewhere"]), 2);
-    assert!(message.contains("--name"), "{message}");
+    for name in ["../elsewhere", "", ".hidden", "two words", &"n".repeat(201)] {
+        let message = refusal(&place.train(&["--name", name]), 2);
+        assert!(message.contains("--name: ") && message.contains("a name of 1 to 200 letters"), "{name}: {message}");
+    }
 }
 
 #[test]

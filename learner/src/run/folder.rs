@@ -8,6 +8,9 @@ use crate::config::Config;
 use crate::error::Error;
 use offtrack_evaluation::files;
 
+/// Maximum length of a run's name: a file system's, 255, less what is put after it.
+const LONGEST_NAME: usize = 200;
+
 /// Where a run writes.
 #[derive(Debug)]
 pub struct Folder(PathBuf);
@@ -126,10 +129,10 @@ pub fn make(runs: &Path, name: Option<&str>, config_file: &Path) -> Result<PathB
 fn named(runs: &Path, name: &str) -> Result<PathBuf, Error> {
     let plain = name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c))
         && !name.starts_with('.')
-        && !name.is_empty();
+        && (1..=LONGEST_NAME).contains(&name.len());
     if !plain {
         let expected =
-            "a name of letters, digits, `-`, `_` and `.` that begins with none of the last is needed".to_owned();
+            format!("a name of 1 to {LONGEST_NAME} letters, digits, `-`, `_` and `.`, not the last first, is needed");
         return Err(Error::setting("--name", format!("{name:?}"), expected));
     }
     let path = runs.join(name);
