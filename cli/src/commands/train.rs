@@ -10,7 +10,6 @@ mod summary;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
 
 use offtrack_commands::signals::on_signals;
 use offtrack_evaluation::files;
@@ -125,10 +124,12 @@ fn check_settings(args: &Args) -> Result<(), Error> {
 /// Lets Ctrl-C, SIGTERM and SIGHUP stop the run: the first lets the step in hand finish and everything be written, the
 /// second ends the process.
 fn stop_on_signals(display: &Display) {
-    let stop = display.stop().clone();
+    let mut stop = Some(display.stopper());
     // Without it a signal ends the process at once; the last policy and checkpoint are whole all the same.
-    on_signals(move || {
-        if stop.swap(true, Ordering::Relaxed) {
+    on_signals(move || match stop.take() {
+        // On a thread of its own: a line may wait for its reader, and a second signal must not.
+        Some(stop) => drop(std::thread::Builder::new().spawn(stop)),
+        None => {
             files::remove_temporaries();
             std::process::exit(130);
         }

@@ -50,6 +50,7 @@ fn a_stopped_run_leaves_a_policy_and_says_that_it_was_interrupted() {
         let output = ended(run, signal);
         succeed(&output);
         assert!(String::from_utf8_lossy(&output.stdout).contains("stopped: "));
+        assert!(String::from_utf8_lossy(&output.stderr).contains("stopping once"));
         let report = place.json("runs/run/report.json");
         assert_eq!((report["interrupted"].as_bool(), report["evaluation"].is_null()), (Some(true), true));
         assert!(0 < report["env_steps"].as_u64().unwrap());

@@ -14,10 +14,14 @@ use offtrack_learner::train::{Begun, Event};
 use super::bar::TrainingDisplay;
 use super::summary;
 
+/// What a first signal is answered with.
+const STOPPING: &str =
+    "stopping once what is in hand is finished and written, an evaluation whole; a second signal ends the process";
+
 /// Shows events as they come. Training goes on when nobody reads its lines; a result that cannot be printed is an error
 /// at the end.
 pub(super) struct Display {
-    state: Mutex<State>,
+    state: Arc<Mutex<State>>,
     /// Set to stop the run.
     stop: Arc<AtomicBool>,
     is_one_of_several: bool,
@@ -37,12 +41,21 @@ struct State {
 impl Display {
     /// Of one run, or of several seeds.
     pub(super) fn new(is_one_of_several: bool) -> Display {
-        Display { state: Mutex::default(), stop: Arc::default(), is_one_of_several }
+        Display { state: Arc::default(), stop: Arc::default(), is_one_of_several }
     }
 
     /// Set to stop the run.
     pub(super) fn stop(&self) -> &Arc<AtomicBool> {
         &self.stop
+    }
+
+    /// What says that the run stops, and stops it.
+    pub(super) fn stopper(&self) -> impl FnOnce() + Send + 'static {
+        let (state, stop) = (self.state.clone(), self.stop.clone());
+        move || {
+            locked(&state).say(STOPPING);
+            stop.store(true, Ordering::Relaxed);
+        }
     }
 
     /// Shows an event.
@@ -67,13 +80,7 @@ impl Display {
             Event::Evaluating { benchmark, done, total } => {
                 state.count(&format!("evaluating on {benchmark}"), "episodes", done, total);
             }
-            Event::Warning(line) => match &state.training {
-                Some(training) => training.warn(line),
-                None => {
-                    state.bar = None;
-                    files::say(line);
-                }
-            },
+            Event::Warning(line) => state.say(line),
             Event::Finished { folder, outcome } => {
                 state.bar = None;
                 if let Err(error) = files::print(&summary::text(folder, outcome, self.is_one_of_several)) {
@@ -93,16 +100,31 @@ impl Display {
 
     /// Clears the terminal. A result that could not be printed is the error.
     pub(super) fn close(self) -> Result<(), Error> {
-        let state = self.state.into_inner().unwrap_or_else(PoisonError::into_inner);
-        state.failure.map_or(Ok(()), Err)
+        let State { failure, .. } = std::mem::take(&mut *self.state());
+        failure.map_or(Ok(()), Err)
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.state)
     }
 }
 
+fn locked(state: &Mutex<State>) -> MutexGuard<'_, State> {
+    state.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 impl State {
+    /// Prints a line beside the bar.
+    fn say(&mut self, line: &str) {
+        match &self.training {
+            Some(training) => training.warn(line),
+            None => {
+                self.bar = None;
+                files::say(line);
+            }
+        }
+    }
+
     /// Shows the bar of what is being done, in place of another one.
     fn count(&mut self, action: &str, unit: &str, done: usize, total: usize) {
         if self.bar.as_ref().is_none_or(|(shown, _)| shown != action) {
