@@ -77,8 +77,8 @@ fn random_roads_stand_beside_roundabouts_from_files_that_have_a_validation_split
 fn every_wrong_key_of_procedural_is_named_with_what_would_do() {
     let folder = tempfile::tempdir().unwrap();
     for (from, to, expected) in [
-        ("seed = 7", "seed = -1", "procedural: invalid value: integer `-1`, expected u32"),
-        ("seed = 7", "seed = 4294967296", "expected u32"),
+        ("seed = 7", "seed = -1", "procedural: invalid value: integer `-1`, expected a whole number in 0..4294967295"),
+        ("seed = 7", "seed = 4294967296", "expected a whole number in 0..4294967295"),
         ("seed = 7", "", "missing field `seed`"),
         ("count = 20", "count = 0", "procedural.count: 0; must lie in 1..1000000"),
         ("count = 20", "count = 1000001", "procedural.count: 1000001; must lie in 1..1000000"),

@@ -132,7 +132,7 @@ fn ranges(file: &str, key: &str) -> Vec<Ends> {
     let values = [beyond.to_string(), format!("[{beyond}]"), format!("{:?}", [1; 100])];
     let range = |value: String| {
         let message = refused(file, format!("{key}={value}"));
-        if message.contains("expected u32") {
+        if message.contains("expected a whole number in 0..4294967295") {
             return Some([Some(0.0), Some(u32::MAX.into())]);
         }
         let (at, range) = message.split_once("; must lie in ")?;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use offtrack::files::reader::{self, Reader, TEXT_LIMIT, read_text};
+use offtrack::files::reader::{self, Reader, TEXT_LIMIT, read_text, said};
 use toml::{Table, Value};
 
 use super::set;
@@ -81,7 +81,7 @@ fn without(file: &Path, table: &mut Table) -> Result<Vec<String>, Error> {
     let keys = table.remove("without").map(read).transpose();
     let expected = "must be a list of keys of the base, as in [\"validation\", \"replay_buffer.priority\"]";
     keys.map(Option::unwrap_or_default)
-        .map_err(|error| Reader::of(file).invalid("without", error.message(), expected).into())
+        .map_err(|error| Reader::of(file).invalid("without", said(&error), expected).into())
 }
 
 fn beside(file: &Path, base: &str) -> PathBuf {

@@ -113,7 +113,7 @@ fn a_key_that_is_unknown_missing_or_of_another_type_is_refused_by_its_name() {
         ("batch", "batch = -4", "invalid value"),
         ("seed", "seed = 4294967296", "invalid value"),
         ("critics", "critics = \"median\"", "unknown variant `median`"),
-        ("hidden", "hidden = 256", "invalid type"),
+        ("hidden", "hidden = 256", "invalid type: integer `256`, expected an array"),
     ] {
         let message = with(key, line).unwrap_err();
         assert!(message.contains(expected), "{line}: {message}");
@@ -345,7 +345,7 @@ fn further_evaluations_are_benchmarks_with_or_without_a_split() {
         (r#"["/train"]"#, "also_evaluate[0]: \"/train\"; must be"),
         (r#"["attard2023"]"#, "also_evaluate[0]: \"attard2023\"; is evaluated already, as `benchmark`"),
         (r#"["random2026/test", "random2026"]"#, "also_evaluate[1]: \"random2026\"; is evaluated already"),
-        (r#""random2026""#, "expected a sequence"),
+        (r#""random2026""#, "expected an array"),
     ] {
         let message = with_also(list).unwrap_err();
         assert!(message.contains(expected), "{list}: {message}");

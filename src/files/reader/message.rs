@@ -102,8 +102,46 @@ pub fn said(error: &toml::de::Error) -> String {
         "wanted string or table" | "invalid type: unit variant, expected string only" => {
             "invalid type, expected a string".to_owned()
         }
-        message => message.replace('\n', ", "),
+        message => {
+            let message = message.replace('\n', ", ");
+            match message.rsplit_once(", expected ") {
+                Some((found, wanted)) if found.starts_with("invalid ") => {
+                    format!("{}, expected {}", found_type(found), wanted_type(wanted))
+                }
+                _ => message,
+            }
+        }
     }
+}
+
+/// What was found where another type is wanted, in TOML's words.
+fn found_type(found: &str) -> Cow<'_, str> {
+    for (name, word) in [("map", "a table"), ("sequence", "an array"), ("floating point", "number")] {
+        if let Some(rest) = found.strip_prefix("invalid type: ").and_then(|rest| rest.strip_prefix(name)) {
+            return format!("invalid type: {word}{rest}").into();
+        }
+    }
+    found.into()
+}
+
+/// A type in TOML's words, where the parser has Rust's.
+fn wanted_type(wanted: &str) -> Cow<'_, str> {
+    match wanted {
+        "f32" | "f64" => "a number".into(),
+        "u8" => whole_numbers(u8::MAX.into()).into(),
+        "u16" => whole_numbers(u16::MAX.into()).into(),
+        "u32" => whole_numbers(u32::MAX).into(),
+        "u64" | "usize" => "a whole number from 0 on".into(),
+        "i32" | "i64" => "a whole number".into(),
+        "a sequence" => "an array".into(),
+        "a map" => "a table".into(),
+        _ if wanted.starts_with("struct ") => "a table".into(),
+        _ => wanted.into(),
+    }
+}
+
+fn whole_numbers(last: u32) -> String {
+    format!("a whole number in 0..{last}")
 }
 
 /// What the TOML parser says of `text`, with the line, the table and the part of the line around the fault.

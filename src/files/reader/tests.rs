@@ -41,8 +41,8 @@ fn a_folder_a_device_and_a_pipe_are_refused_before_they_are_read() {
 fn a_fault_is_reported_with_its_line_its_column_and_its_table() {
     assert_eq!(
         refusal("[a]\nb = 1\n[c]\n  d = true # a remark\n"),
-        "numbers.toml: line 4, column 7: c: invalid type: boolean `true`, expected f64; the line is: d = true # a \
-         remark"
+        "numbers.toml: line 4, column 7: c: invalid type: boolean `true`, expected a number; the line is: d = true \
+         # a remark"
     );
 }
 

@@ -228,7 +228,7 @@ fn stated(error: &Error, place: &[Step]) -> Option<(Ends, String)> {
             let range = expected.strip_prefix("must lie in ")?;
             Some((ends(range)?, range.split_once(' ').map(|(_, unit)| unit.to_owned()).unwrap_or_default()))
         }
-        Error::Malformed { message, .. } if message.contains("expected u32") => {
+        Error::Malformed { message, .. } if message.contains("expected a whole number in 0..4294967295") => {
             message.contains(place.rsplit('.').next()?).then_some(([Some(0.0), Some(u32::MAX.into())], String::new()))
         }
         _ => None,
