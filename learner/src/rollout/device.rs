@@ -77,7 +77,7 @@ impl<const N: usize> DeviceRollout<N> {
         routes: Vec<u32>,
         mirror: Option<Mirror>,
     ) -> Result<DeviceRollout<N>, Error> {
-        DeviceRollout::with_seeds(gpu, config, world, routes, mirror, seeds(config.seed, 0))
+        DeviceRollout::with_seeds(gpu, config, world, routes, mirror, Seeds::after(config.seed, 0))
     }
 
     fn with_seeds(
@@ -86,7 +86,7 @@ impl<const N: usize> DeviceRollout<N> {
         world: &Arc<World>,
         routes: Vec<u32>,
         mirror: Option<Mirror>,
-        seeds: [u32; 2],
+        seeds: Seeds,
     ) -> Result<DeviceRollout<N>, Error> {
         let (n_envs, n_rows) = (config.n_envs, config.learning.batch);
         let n_slots = config.replay_buffer.capacity.div_ceil(n_envs);
@@ -103,7 +103,7 @@ impl<const N: usize> DeviceRollout<N> {
         let engine = Engine::Gpu { device: gpu.clone(), columns: External::new() };
         let level_replay = config.level_replay.map(|settings| LevelReplay::new(settings, routes.clone()));
         let drawn = level_replay.as_ref().map_or_else(|| routes.clone(), |replay| replay.list().to_vec());
-        let simulator = Simulator::on(engine, world.clone(), n_envs, config.seed, RouteChoice::Drawn(drawn))?;
+        let simulator = Simulator::on(engine, world.clone(), n_envs, seeds.episodes, RouteChoice::Drawn(drawn))?;
         let priority = config.replay_buffer.priority;
         let facts = Facts {
             n_envs: n_envs as u32,
@@ -113,8 +113,8 @@ impl<const N: usize> DeviceRollout<N> {
             n_extras: (N - N_VALUES - n_around(N)) as u32,
             n_rows: n_rows as u32,
             n_steps: config.learning.n_steps as u32,
-            acting_seed: seeds[0],
-            sampling_seed: seeds[1],
+            acting_seed: seeds.acting,
+            sampling_seed: seeds.sampling,
             n_blocks: ((n_slots * n_envs) as u32).div_ceil(BLOCK),
             mirrored: mirror.is_some().into(),
             gamma: config.learning.gamma as f32,
@@ -344,8 +344,8 @@ impl<const N: usize> Rollout for DeviceRollout<N> {
     }
 
     fn restore(&mut self, stored: &Stored, n_updates: u64) -> Result<(), Error> {
-        // Other actions and samples than the first time.
-        let seeds = seeds(self.config.seed, n_updates as u32);
+        // Other episodes, actions and samples than the first time.
+        let seeds = Seeds::after(self.config.seed, n_updates as u32);
         let world = self.simulator.world().clone();
         *self = DeviceRollout::with_seeds(
             &self.gpu,
@@ -376,9 +376,20 @@ fn add(
     }
 }
 
-/// Seeds of actions and samples, after so many updates.
-fn seeds(seed: u32, n_updates: u32) -> [u32; 2] {
-    [1, 2].map(|purpose| random::words(seed, purpose, n_updates, u32::MAX)[0])
+/// What is drawn from.
+#[derive(Debug, Clone, Copy)]
+struct Seeds {
+    episodes: u32,
+    acting: u32,
+    sampling: u32,
+}
+
+impl Seeds {
+    /// Those of a run after so many updates: the episodes of a new one are of its own seed.
+    fn after(seed: u32, n_updates: u32) -> Seeds {
+        let [acting, sampling, later] = [1, 2, 3].map(|purpose| random::words(seed, purpose, n_updates, u32::MAX)[0]);
+        Seeds { episodes: if n_updates == 0 { seed } else { later }, acting, sampling }
+    }
 }
 
 #[cfg(test)]

@@ -41,6 +41,10 @@ fn mirror_of(config: &Config, mirror: &Mirror) -> Option<Mirror> {
     config.learning.mirror_augmentation.then(|| mirror.clone())
 }
 
+fn seeds(config: &Config) -> Seeds {
+    Seeds { episodes: config.seed, acting: 7, sampling: 8 }
+}
+
 /// One step of one truck.
 struct Step<const N: usize> {
     seen: [f32; N],
@@ -112,7 +116,7 @@ fn check_samples<const N: usize>(benchmark: &str) {
         ["learning.mirror_augmentation=false", "learning.observation_noise=0"],
     ] {
         let config = config(&settings);
-        let (n_envs, n_steps, seeds) = (config.n_envs, config.learning.n_steps, [7, 8]);
+        let (n_envs, n_steps, seeds) = (config.n_envs, config.learning.n_steps, seeds(&config));
         let mut rollout =
             DeviceRollout::<N>::with_seeds(&gpu, &config, &world, routes.clone(), mirror_of(&config, &mirror), seeds)
                 .unwrap();
@@ -146,7 +150,7 @@ fn check_samples<const N: usize>(benchmark: &str) {
         let n_slots = config.replay_buffer.capacity.div_ceil(n_envs);
         let (mut ends, mut mirrored) = (0, 0);
         for row in 0..config.learning.batch {
-            let drawn = words(seeds[1], row as u32, 0, 0);
+            let drawn = words(seeds.sampling, row as u32, 0, 0);
             let first = 100 - n_slots + index_below(drawn[0], (n_slots - n_steps) as u32) as usize;
             let env = index_below(drawn[1], n_envs as u32) as usize;
             let (mut sum, mut weight, mut last) = (0.0f32, 1.0f32, first);
@@ -181,7 +185,7 @@ fn check_samples<const N: usize>(benchmark: &str) {
                 let expected = normalisation.apply(&[image(seen)]);
                 for value in 0..N {
                     let noise = config.learning.observation_noise as f32
-                        * signed_unit(words(seeds[1], row as u32, 0, 1 + value as u32)[0]);
+                        * signed_unit(words(seeds.sampling, row as u32, 0, 1 + value as u32)[0]);
                     let difference = found[row * N + value] - (expected[value] + noise);
                     // Normalised values lie within 10.
                     assert!(difference.abs() < 1e-5, "{value}: {difference}");
@@ -202,7 +206,7 @@ fn the_replay_buffer_has_the_simulators_rewards_and_more_for_an_arrival_where_th
     for (setting, arrival) in [("seed=0", 0.0), ("learning.arrival=1500", 1500.0)] {
         let config = config(&["n_envs=16", "replay_buffer.capacity=4000", setting]);
         let mut rollout =
-            DeviceRollout::<N_VALUES>::with_seeds(&gpu, &config, &world, routes.clone(), None, [7, 8]).unwrap();
+            DeviceRollout::<N_VALUES>::with_seeds(&gpu, &config, &world, routes.clone(), None, seeds(&config)).unwrap();
         rollout.set_normalisation(&policy.normalisation);
         let (mut expected, mut arrivals) = (Vec::new(), 0);
         for _ in 0..250 {
@@ -224,7 +228,8 @@ fn actions_follow_the_actors_distribution() {
     let (world, routes) = training();
     let gpu = least();
     let config = config(&["n_envs=4096", "replay_buffer.capacity=100000"]);
-    let mut rollout = DeviceRollout::<N_VALUES>::with_seeds(&gpu, &config, &world, routes, None, [7, 8]).unwrap();
+    let mut rollout =
+        DeviceRollout::<N_VALUES>::with_seeds(&gpu, &config, &world, routes, None, seeds(&config)).unwrap();
     // Probabilities of 1/45, 2/45, ... 9/45.
     let actor = constant(&gpu, (1..=9).map(|rank| (rank as f32).ln()).collect());
     let mut counts = [0usize; 9];
@@ -247,15 +252,9 @@ fn actions_follow_the_actors_distribution() {
 fn trucks_take_the_actions_of_the_latest_output() {
     let (world, routes) = training();
     let gpu = least();
-    let mut rollout = DeviceRollout::<N_VALUES>::with_seeds(
-        &gpu,
-        &config(&["learning.mirror_augmentation=false"]),
-        &world,
-        routes,
-        None,
-        [7, 8],
-    )
-    .unwrap();
+    let config = config(&["learning.mirror_augmentation=false"]);
+    let mut rollout =
+        DeviceRollout::<N_VALUES>::with_seeds(&gpu, &config, &world, routes, None, seeds(&config)).unwrap();
     for step in 0..40 {
         let actor = constant(&gpu, (0..9).map(|action| if action == step % 9 { 50.0 } else { 0.0 }).collect());
         rollout.step_by(Some(&actor), true).unwrap();

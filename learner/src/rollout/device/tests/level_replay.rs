@@ -7,7 +7,8 @@ fn routes_are_drawn_anew_by_the_episodes_that_ended_on_them_and_so_after_a_check
     let (world, routes) = training();
     let config = config(&["level_replay.fraction=0.5", "level_replay.rate=0.2"]);
     let gpu = least();
-    let new = || DeviceRollout::<N_VALUES>::with_seeds(&gpu, &config, &world, routes.clone(), None, [7, 8]).unwrap();
+    let new =
+        || DeviceRollout::<N_VALUES>::with_seeds(&gpu, &config, &world, routes.clone(), None, seeds(&config)).unwrap();
     let list = |rollout: &DeviceRollout<N_VALUES>| rollout.simulator().batch().choice().routes().to_vec();
     let mut rollout = new();
     let mut replay = LevelReplay::new(config.level_replay.unwrap(), routes.clone());
@@ -39,6 +40,12 @@ fn routes_are_drawn_anew_by_the_episodes_that_ended_on_them_and_so_after_a_check
     rollout.save(&mut columns);
     columns.write(&path, String::new(), 0).unwrap();
     let mut resumed = new();
+    let begins = |rollout: &DeviceRollout<N_VALUES>| rollout.simulator().batch().truck.clone();
+    let earlier = [begins(&resumed), begins(&rollout)];
     resumed.restore(&Stored::read(&path).unwrap(), 1).unwrap();
     assert_eq!(list(&resumed), replay.list());
+    // Neither the run's first episodes nor those of the checkpoint.
+    assert!(
+        earlier.iter().flatten().all(|truck| begins(&resumed).iter().all(|other| other.position != truck.position))
+    );
 }

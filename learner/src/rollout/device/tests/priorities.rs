@@ -8,7 +8,8 @@ fn rollout(exponent: f64, n_steps: usize, settings: &[&str]) -> DeviceRollout<N_
     let exponent = format!("replay_buffer.priority.exponent={exponent}");
     let settings = [&[exponent.as_str(), "replay_buffer.priority.correction=0.4"], settings].concat();
     let gpu = least();
-    let mut rollout = DeviceRollout::with_seeds(&gpu, &config(&settings), &world, routes, None, [7, 8]).unwrap();
+    let config = config(&settings);
+    let mut rollout = DeviceRollout::with_seeds(&gpu, &config, &world, routes, None, seeds(&config)).unwrap();
     (0..n_steps).for_each(|_| rollout.step_at_random().unwrap());
     rollout
 }
@@ -113,7 +114,8 @@ fn transitions_are_sampled_in_proportion_to_their_priorities_which_uniform_sampl
     // 400,000 draws; the rows of error 0 have the root of 1e-6 as their priority, all together 1e-4 of the sum.
     assert!(departs < 5.0 && rare < 100.0, "{departs} {rare}");
     let (world, routes) = training();
-    let mut uniform = DeviceRollout::with_seeds(&rollout.gpu, &config(&sizes), &world, routes, None, [7, 8]).unwrap();
+    let config = config(&sizes);
+    let mut uniform = DeviceRollout::with_seeds(&rollout.gpu, &config, &world, routes, None, seeds(&config)).unwrap();
     (0..40).for_each(|_| uniform.step_at_random().unwrap());
     let (departs, rare) = departure(&mut uniform, &priorities);
     assert!(100.0 < departs && 1000.0 < rare, "{departs} {rare}");
