@@ -18,7 +18,7 @@ use glam::DVec2;
 
 pub use alignment::{Bend, Misfit, rounded, to_circle};
 pub(crate) use fit::arc_of_height;
-pub use fit::{fitted_line, fitted_outline};
+pub use fit::{bulging_outline, fitted_line, fitted_outline};
 pub use outline::{Nearby, Outline};
 
 /// A straight or a circular piece of a curve.

@@ -177,7 +177,7 @@ fn simplified(contour: &[[f64; 2]], tolerance: f64) -> Vec<[f64; 2]> {
 
 /// A contour without the points at which it turns back while the next edge lies within `tolerance` of the last one, or
 /// the last one of the next (m).
-fn without_spikes(contour: &[[f64; 2]], tolerance: f64) -> Vec<[f64; 2]> {
+pub(crate) fn without_spikes(contour: &[[f64; 2]], tolerance: f64) -> Vec<[f64; 2]> {
     let mut kept = contour.to_vec();
     let (mut at, mut n_passed) = (0, 0);
     while 3 < kept.len() && n_passed < kept.len() {

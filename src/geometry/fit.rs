@@ -14,10 +14,16 @@ const STEP: f64 = 0.5;
 /// Most points that one piece replaces.
 const MOST_POINTS: usize = 4000;
 
-/// The closed polyline as a closed curve: every one of its points is within `tolerance` of the curve (m).
+/// The closed polyline as a closed curve: every one of its points is within `tolerance` of the curve, and between them
+/// the curve is within `tolerance` of the polyline (m).
 ///
 /// The curve goes around as the polyline does. It is empty for fewer than three points.
 pub fn fitted_outline(polyline: &[DVec2], tolerance: f64) -> Curve {
+    bulging_outline(polyline, tolerance, tolerance)
+}
+
+/// The same, but that the curve may be `bulge` from the polyline between its points (m).
+pub fn bulging_outline(polyline: &[DVec2], tolerance: f64, bulge: f64) -> Curve {
     let mut points = distinct(polyline);
     while 1 < points.len() && points[0].distance(points[points.len() - 1]) < 1e-9 {
         points.pop();
@@ -35,7 +41,8 @@ pub fn fitted_outline(polyline: &[DVec2], tolerance: f64) -> Curve {
     // No piece may reach around the whole loop: its ends would coincide.
     let third = points.len().div_ceil(3);
     let pieces = greedy(&points, |from, to| {
-        (to - from <= third).then(|| arc_through(&points[from..=to], tolerance)).flatten().map(|piece| vec![piece])
+        let piece = (to - from <= third).then(|| arc_through(&points[from..=to], tolerance)).flatten();
+        piece.filter(|piece| bulge_of(&points[from..=to], piece) <= bulge).map(|piece| vec![piece])
     });
     Curve { pieces: joined(pieces) }
 }
@@ -76,6 +83,17 @@ fn farthest(points: &[DVec2], piece: &Piece) -> f64 {
             farthest(&|p| ahead.perp_dot(p - from).abs())
         }
         Piece::Arc { centre, radius, .. } => farthest(&|p| (p.distance(centre) - radius).abs()),
+    }
+}
+
+/// Largest distance of a piece from the polyline of these points, on its line or circle, between two of them (m).
+fn bulge_of(points: &[DVec2], piece: &Piece) -> f64 {
+    match *piece {
+        Piece::Segment { .. } => 0.0,
+        Piece::Arc { radius, .. } => {
+            let chord = points.windows(2).map(|pair| pair[0].distance(pair[1])).fold(0.0, f64::max);
+            radius - (radius * radius - chord * chord / 4.0).max(0.0).sqrt()
+        }
     }
 }
 
@@ -348,5 +366,16 @@ mod tests {
         let curve = fitted_outline(&triangle, 0.005);
         assert_eq!(curve.pieces.len(), 3);
         assert!(triangle.iter().all(|&p| curve.pieces.iter().any(|piece| piece.start().distance(p) < 1e-12)));
+    }
+
+    #[test]
+    fn corners_of_rectangles_of_any_size_are_not_rounded() {
+        for index in 0..60 {
+            let (length, width) = (2.0 + 0.13 * f64::from(index), 0.7 + 0.05 * f64::from(index % 7));
+            let corners = [[0.0, 0.0], [length, 0.0], [length, width], [0.0, width]];
+            let turn = DVec2::from_angle(0.1 * f64::from(index));
+            let curve = fitted_outline(&corners.map(|corner| turn.rotate(DVec2::from(corner))), 0.004);
+            assert!((curve.signed_area() - length * width).abs() < 0.02, "{length} {width}: {}", curve.signed_area());
+        }
     }
 }

@@ -69,8 +69,15 @@ fn ways_that_lead_nowhere_are_refused_with_what_there_is() {
     }
 }
 
-fn apart(one: &Outline, other: &Outline) -> f64 {
-    one.loops.iter().flat_map(|curve| curve.polyline(0.01)).map(|p| other.distance(p)).fold(0.0, f64::max)
+/// Of one outline, the part that is farther than 1 cm from another, and the largest distance (m).
+fn apart(one: &Outline, other: &Outline) -> (f64, f64) {
+    let points = one
+        .loops
+        .iter()
+        .flat_map(|curve| (0..(curve.length() / 0.02) as usize).map(|index| curve.point_at(0.02 * index as f64)));
+    let distances: Vec<f64> = points.map(|p| other.distance(p)).collect();
+    let far = distances.iter().filter(|&&distance| 0.01 < distance).count();
+    (far as f64 / distances.len() as f64, distances.into_iter().fold(0.0, f64::max))
 }
 
 #[test]
@@ -86,8 +93,11 @@ fn shipped_outlines_are_what_their_maps_give() {
         let imported = Road::from_map(&folder().join(format!("{map}.xodr")), &choice).unwrap();
         for gutter in [Gutter::Drivable, Gutter::Solid] {
             let (one, other) = (shipped.kerbs(gutter), imported.kerbs(gutter));
-            // Curves are fitted within 5 mm, elsewhere perhaps by other pieces.
-            assert!(apart(&one, &other).max(apart(&other, &one)) < 0.01, "{outline}");
+            // Curves are fitted within 5 mm, elsewhere perhaps by other pieces. The shipped files were written when arcs
+            // rounded corners; they stay, so that their benchmarks keep their bits.
+            for (far, most) in [apart(&one, &other), apart(&other, &one)] {
+                assert!(far < 0.03 && most < 0.18, "{outline}: {far} {most}");
+            }
         }
         // The shipped files have the origin to a tenth of a millimetre.
         let [one, other] = [&shipped, &imported].map(|road| road.ground().frame());

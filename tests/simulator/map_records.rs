@@ -28,6 +28,23 @@ fn connections_of_a_junction_that_is_written_twice_count_together() {
 }
 
 #[test]
+fn what_is_not_read_is_warned_of_includes_links_along_a_road_and_further_links_of_a_lane() {
+    let changed = |from: &str, to: &str| {
+        let text = plain();
+        assert!(text.contains(from), "{from}");
+        warnings(&text.replacen(from, to, 1))
+    };
+    let said = changed("<road ", "<include file=\"more.xodr\"/><road ");
+    assert!(said.contains("1 includes of other files are not read: put what they have here"), "{said}");
+    let said = changed("<junction ", "<junction type=\"virtual\" ");
+    assert!(said.contains("is virtual: only roads that end at a junction are joined by it"), "{said}");
+    let said = changed("contactPoint=\"start\"/>", "elementS=\"3\" elementDir=\"+\"/>");
+    assert!(said.contains("leads to a place along a road (elementS); only ends of roads are joined"), "{said}");
+    let said = changed("<successor id=\"-1\"/>", "<successor id=\"-1\"/><successor id=\"-2\"/>");
+    assert!(said.contains("has several links successor; the first is read"), "{said}");
+}
+
+#[test]
 fn the_crossfall_of_old_versions_is_warned_of_on_either_side() {
     for side in ["left", "right", "both"] {
         let profile = format!(

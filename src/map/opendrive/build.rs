@@ -229,17 +229,18 @@ fn island(map: &Map, ring: &Ring, extent: f64) -> Option<Island> {
     })
 }
 
-/// Radius of the circle around a ring where its arms begin, the lanes of the arms, and what became of bypasses.
+/// Radius of the circle around a ring where its arms begin, the lanes of the arms, and what became of
+/// bypasses and of lanes that pass it by.
 fn ring_arms(map: &Map, origin: DVec2, radius: f64, around_ring: &Around) -> (f64, Vec<ArmLanes>, Vec<String>) {
     let &Around { network, reach, .. } = around_ring;
     let coarse = surroundings::nearby(map, origin, radius + REACH, super::COARSE);
     let (indices, around): (Vec<usize>, Vec<Strip>) = coarse.into_iter().unzip();
     let circle = circle(&map.records, &around, radius);
     let mut crossings = crossings(&around, &indices, &map.graph, circle);
-    drop_passing_lanes(&mut crossings, network, reach);
+    let passing = drop_passing_lanes(&mut crossings, network, reach);
     let gate = |crossing: &Crossing| network.gate(crossing, reach);
     let (arms, bypasses) = around_ring.merged(joined(arms(&crossings, circle), gate, reach));
-    (circle, arms, bypasses)
+    (circle, arms, bypasses.into_iter().chain(passing).collect())
 }
 
 /// An error if the arms of a place are none, or too many.
@@ -305,6 +306,12 @@ fn add_routes(routes: &mut Lines, lanes: &[ArmLanes], island_radius: f64, outer_
                 });
             }
         }
+        for exit_arm in (0..n_arms).filter(|&exit| 0 < n && !lanes[exit].exits.is_empty()) {
+            if !routes.lines.iter().any(|line| (line.entry, line.exit_arm) == (entry, exit_arm)) {
+                let [from, to] = [entry, exit_arm].map(|arm| &routes.arms[arm].name);
+                routes.warnings.push(format!("{}: no lanes lead from arm {from} to arm {to}", routes.place));
+            }
+        }
     }
 }
 
@@ -313,8 +320,9 @@ fn passes_outside(line: &[DVec2], outer_radius: f64) -> bool {
     line.iter().all(|p| outer_radius < p.length())
 }
 
-/// Drops lanes that no way through the ring begins or ends on: those of roads that pass by.
-fn drop_passing_lanes(crossings: &mut Vec<Crossing>, network: &Network, reach: f64) {
+/// Drops lanes that no way through the ring begins or ends on: those of roads that pass by. Told is of those that lie
+/// on a road of the ring's.
+fn drop_passing_lanes(crossings: &mut Vec<Crossing>, network: &Network, reach: f64) -> Vec<String> {
     let alone = |crossing: &Crossing| match crossing.inwards {
         true => ArmLanes { entries: vec![crossing.clone()], exits: Vec::new() },
         false => ArmLanes { entries: Vec::new(), exits: vec![crossing.clone()] },
@@ -328,8 +336,19 @@ fn drop_passing_lanes(crossings: &mut Vec<Crossing>, network: &Network, reach: f
             }
         }
     }
-    let mut used = used.into_iter();
-    crossings.retain(|_| used.next().unwrap_or(false));
+    let roads = |crossing: &Crossing| -> Vec<usize> {
+        crossing.strips.iter().filter_map(|strip| Some(network.strips.get(strip)?.road)).collect()
+    };
+    let (kept, dropped): (Vec<_>, Vec<_>) =
+        std::mem::take(crossings).into_iter().zip(used).partition(|(_, used)| *used);
+    *crossings = kept.into_iter().map(|(crossing, _)| crossing).collect();
+    let of_ring: Vec<usize> = crossings.iter().flat_map(roads).collect();
+    let dropped = dropped.iter().filter(|(crossing, _)| roads(crossing).iter().any(|road| of_ring.contains(road)));
+    let told = |(crossing, _): &(Crossing, bool)| {
+        let names: Vec<String> = crossing.strips.iter().map(|&strip| network.name(strip)).collect();
+        format!("{} passes the ring by too far from it, and is left out", names.join(", "))
+    };
+    dropped.map(told).collect()
 }
 
 /// Radius of the ring's outer kerb: the island's and what is free beyond it between the arms.

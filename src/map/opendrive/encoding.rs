@@ -45,6 +45,8 @@ pub(super) fn text(file: &Path, bytes: Vec<u8>) -> Result<String, Error> {
         let at = error.utf8_error().valid_up_to();
         let declared = if encoding.is_empty() {
             String::new()
+        } else if encoding.eq_ignore_ascii_case("utf-8") {
+            ", which it declares to be".to_owned()
         } else {
             format!(", and its encoding, {}, is not read", shown(&encoding))
         };
@@ -102,6 +104,10 @@ mod tests {
             (b"<\0a", "m.xodr: is no valid UTF-16"),
             (b"<a \xdf/>", "m.xodr: is no valid UTF-8 from byte 3 on; save it as UTF-8"),
             (b"<?xml version='1.0' encoding='koi8-r'?>\xdf", "its encoding, koi8-r, is not read"),
+            (
+                b"<?xml version='1.0' encoding='UTF-8'?>\xdf",
+                "from byte 38 on, which it declares to be; save it as UTF-8",
+            ),
         ] {
             let message = read(bytes).unwrap_err();
             assert!(message.contains(expected), "{message}");

@@ -73,13 +73,13 @@ pub(super) fn reason(records: &Records, strip: &Strip, follow: bool) -> String {
     let road = &records.roads[strip.road];
     let lane = records.lane_name(strip);
     let forward = strip.backward != follow;
-    let (verb, inner) = if forward {
-        ("leads on to", strip.section + 1 < road.sections.len())
+    let (verb, beside, inner) = if forward {
+        ("leads on to", "next", strip.section + 1 < road.sections.len())
     } else {
-        ("comes from", 0 < strip.section)
+        ("comes from", "previous", 0 < strip.section)
     };
     if inner {
-        return format!("{lane} has no link to a lane of the road's next section");
+        return format!("{lane} has no link that fits to a lane of the road's {beside} section");
     }
     match if forward { &road.successor } else { &road.predecessor } {
         None => format!("road {} is linked to no road there", shown(&road.id)),

@@ -59,6 +59,9 @@ pub(super) fn records(file: &Path, text: &str, hand: Hand) -> Result<Records, Er
         source.records.roads.push(road);
     }
     for node in children(root, "junction") {
+        if attribute(node, "type") == "virtual" {
+            source.warn(node, "is virtual: only roads that end at a junction are joined by it");
+        }
         let connections = source.junction(node)?;
         let id = attribute(node, "id");
         if source.records.junctions.contains_key(id) {
@@ -86,6 +89,13 @@ pub(super) fn records(file: &Path, text: &str, hand: Hand) -> Result<Records, Er
     let signals = root.descendants().filter(|node| node.has_tag_name("signal")).count();
     if 0 < signals {
         source.records.warnings.push(format!("{signals} signals are not read"));
+    }
+    let includes = root.descendants().filter(|node| node.has_tag_name("include")).count();
+    if 0 < includes {
+        source
+            .records
+            .warnings
+            .push(format!("{includes} includes of other files are not read: put what they have here"));
     }
     let mut records = source.records;
     if records.mirrored {
@@ -223,6 +233,13 @@ impl Source<'_, '_> {
     /// What an end of a road is linked to; one of another kind is warned of.
     fn road_link(&mut self, node: Node) -> Option<Link> {
         let id = attribute(node, "elementId").to_owned();
+        if node.has_attribute("elementS") {
+            self.warn(
+                node,
+                "leads to a place along a road (elementS); only ends of roads are joined, and it is not read",
+            );
+            return None;
+        }
         match attribute(node, "elementType") {
             "road" => Some(Link::RoadRecord(id, self.is_at_start(node))),
             "junction" => Some(Link::Junction(id)),

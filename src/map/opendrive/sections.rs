@@ -5,6 +5,7 @@
 
 use roxmltree::Node;
 
+use super::read::RAISED;
 use super::records::{Cubic, Height, Kind, Lane, Section};
 use super::source::Source;
 use super::xml::{attribute, child, children};
@@ -95,6 +96,11 @@ impl Source<'_, '_> {
             heights.push(Height { start: self.length(height, "sOffset")?, height: of("inner")?.max(of("outer")?) });
         }
         heights.sort_by(|one, other| one.start.total_cmp(&other.start));
+        let is_raised = |height: &Height| RAISED < height.height;
+        let begins_level = heights.first().is_none_or(|first| 0.0 < first.start || !is_raised(first));
+        if heights.iter().any(is_raised) && (begins_level || !heights.iter().all(is_raised)) {
+            self.warn(node, "is raised on a part of its way; it counts as raised on all of it");
+        }
         let bordered = widths.is_empty() && !borders.is_empty();
         if !widths.is_empty() && !borders.is_empty() {
             self.warn(node, "has width and border; the border is not read");
@@ -116,6 +122,11 @@ impl Source<'_, '_> {
             return Err(self.invalid(node, "width", &value, format!("must be at most {WIDEST} m")));
         }
         let link = child(node, "link");
+        for name in ["predecessor", "successor"] {
+            if link.is_some_and(|link| 1 < children(link, name).count()) {
+                self.warn(node, &format!("has several links {name}; the first is read"));
+            }
+        }
         let end = |name: &'static str| {
             link.and_then(|link| child(link, name)).and_then(|end| attribute(end, "id").parse::<i32>().ok())
         };

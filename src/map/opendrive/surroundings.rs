@@ -9,7 +9,7 @@ use super::Map;
 use super::lanes::{Strip, sampled};
 use super::records::Kind;
 use super::surface::Surface;
-use crate::geometry::area::{Area, corners_of_circle, points, signed_area};
+use crate::geometry::area::{Area, corners_of_circle, points, signed_area, without_spikes};
 use crate::geometry::{Curve, Outline, fitted_outline};
 
 /// Chords of edges leave their curves by at most this much before arcs are fitted (m).
@@ -48,10 +48,12 @@ pub(super) fn clipped(surface: &Area, extent: f64) -> Vec<Part> {
     surface.common(&disc).parts
 }
 
-/// A part of a surface as arcs and segments around another origin.
+/// A part of a surface as arcs and segments around another origin, without spikes.
 pub(super) fn outline(part: &Part, origin: DVec2) -> Outline {
     let kept = part.iter().filter(|contour| SMALLEST < signed_area(contour).abs());
-    let curves = kept.map(|contour| fitted_outline(&moved(&points(contour), origin), FITTED));
+    let curves = kept
+        .map(|contour| without_spikes(contour, FITTED))
+        .map(|contour| fitted_outline(&moved(&points(&contour), origin), FITTED));
     Outline::new(curves.filter(|curve: &Curve| !curve.pieces.is_empty()).collect())
 }
 

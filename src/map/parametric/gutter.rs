@@ -11,7 +11,7 @@ use super::ring::Ring;
 use super::roundabout_keys::{Written, WrittenDirection};
 use crate::files::reader::{Error, Reader, shown};
 use crate::geometry::area::{Area, counter_clockwise, points, signed_area};
-use crate::geometry::{Curve, Outline, Piece, fitted_outline, wrapped};
+use crate::geometry::{Curve, Outline, Piece, bulging_outline, wrapped};
 
 /// Chords of faces and edges leave their curves by at most this much (m).
 const FINE: f64 = 1e-3;
@@ -255,6 +255,6 @@ fn left(faces: &Outline, triangles: Vec<Vec<DVec2>>) -> Outline {
     let lanes = lanes.without_slits(SLIT, 0.0);
     let size = |part: &[Vec<[f64; 2]>]| part.iter().map(|contour| signed_area(contour)).sum::<f64>();
     let largest = lanes.parts.iter().max_by(|one, other| size(one).total_cmp(&size(other)));
-    let loops = largest.into_iter().flatten().map(|contour| fitted_outline(&points(contour), FITTED));
+    let loops = largest.into_iter().flatten().map(|contour| bulging_outline(&points(contour), FITTED, f64::INFINITY));
     Outline::new(loops.filter(|curve| !curve.pieces.is_empty()).collect())
 }
