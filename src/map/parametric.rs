@@ -39,6 +39,10 @@ use lane::{Lanes, RouteLine};
 use ring::Ring;
 use roundabout_keys::{Arm, Written};
 
+/// What rounding may take from a distance of a file that is just kept; roads that are drawn stay those of their names
+/// (m).
+const ROUNDING: f64 = 1e-9;
+
 /// Stages of the check of a roundabout, in their order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Stage {
@@ -125,13 +129,14 @@ impl Road {
 
     /// The roundabout that `written` describes, checked as a file is; `reader` names its origin in errors.
     pub(crate) fn checked(name: String, reader: Reader, written: Written) -> Result<Road, Error> {
-        Road::staged(name, reader, written).map_err(|(_, error)| error)
+        Road::staged(name, reader, written, ROUNDING).map_err(|(_, error)| error)
     }
 
-    /// The road that `written` describes, checked; an error says in which stage of the check it was found.
-    pub(crate) fn staged(name: String, reader: Reader, written: Written) -> Result<Road, (Stage, Error)> {
+    /// The road that `written` describes, checked; an error says in which stage of the check it was found. Distances
+    /// that must be kept may lack `slack` (m).
+    pub(crate) fn staged(name: String, reader: Reader, written: Written, slack: f64) -> Result<Road, (Stage, Error)> {
         if written.is_left_hand() {
-            let roundabout = Road::staged(name, reader, written.mirrored());
+            let roundabout = Road::staged(name, reader, written.mirrored(), slack);
             return roundabout
                 .map(|Road { name, ground }| Road { name, ground: Ground { mirrored: true, ..ground } })
                 .map_err(|(stage, error)| (stage, hand::as_written(error)));
@@ -141,8 +146,8 @@ impl Road {
         let (ring, arms) = written.checked(&reader).map_err(at(Stage::Values))?;
         let (kerbs, corners) = kerb::kerbs(&reader, &ring, &arms).map_err(at(Stage::Kerbs))?;
         let lanes = Lanes::new(&reader, &ring, &arms).map_err(at(Stage::Lanes))?;
-        check::lanes_clear_of_kerbs(&reader, &kerbs, &arms, &lanes).map_err(at(Stage::Clear))?;
-        check::lanes_beside_each_other(&reader, &arms, &lanes).map_err(at(Stage::Beside))?;
+        check::lanes_clear_of_kerbs(&reader, &kerbs, &arms, &lanes, slack).map_err(at(Stage::Clear))?;
+        check::lanes_beside_each_other(&reader, &arms, &lanes, slack).map_err(at(Stage::Beside))?;
         let edges = match gutters {
             Some(gutters) => Edges::Own(gutters.edges(&reader, &ring, &kerbs, &corners).map_err(at(Stage::Clear))?),
             None => Edges::Beside(ring.gutter),

@@ -17,18 +17,25 @@ const NEAREST: f64 = 1.3;
 const LANES_APART: f64 = 2.5;
 
 /// Every lane keeps half a truck's width from every kerb, splitters included.
-pub(super) fn lanes_clear_of_kerbs(reader: &Reader, kerbs: &Outline, arms: &[Arm], lanes: &Lanes) -> Result<(), Error> {
+pub(super) fn lanes_clear_of_kerbs(
+    reader: &Reader,
+    kerbs: &Outline,
+    arms: &[Arm],
+    lanes: &Lanes,
+    slack: f64,
+) -> Result<(), Error> {
+    let clear = |curve: &Curve, key: &str| clear(reader, kerbs, curve, key, slack);
     for index in 0..arms.len() {
         for way in [Way::Entry, Way::Exit] {
             for (lane, curve) in lanes.of(index, way).rev() {
-                clear(reader, kerbs, curve, &format!("arm[{index}].{}.{}", way.name(), lane.name()))?;
+                clear(curve, &format!("arm[{index}].{}.{}", way.name(), lane.name()))?;
             }
         }
         if let Some(curve) = lanes.merge(index) {
-            clear(reader, kerbs, curve, &format!("arm[{index}].exit.right"))?;
+            clear(curve, &format!("arm[{index}].exit.right"))?;
         }
         if let Some(curve) = lanes.first_exit(index) {
-            clear(reader, kerbs, curve, &format!("arm[{index}].corner.lane_radius"))?;
+            clear(curve, &format!("arm[{index}].corner.lane_radius"))?;
         }
     }
     Ok(())
@@ -39,7 +46,7 @@ pub(super) fn lanes_clear_of_kerbs(reader: &Reader, kerbs: &Outline, arms: &[Arm
 ///
 /// At the arm's end, where all lanes are parallel, their order is checked. Beyond, no two may come nearer than
 /// [`LANES_APART`], so none crosses another.
-pub(super) fn lanes_beside_each_other(reader: &Reader, arms: &[Arm], lanes: &Lanes) -> Result<(), Error> {
+pub(super) fn lanes_beside_each_other(reader: &Reader, arms: &[Arm], lanes: &Lanes, slack: f64) -> Result<(), Error> {
     for (index, arm) in arms.iter().enumerate() {
         let named = |way: Way| move |(lane, curve)| Beside { way, lane, curve };
         let entries = lanes.of(index, Way::Entry).map(named(Way::Entry));
@@ -49,7 +56,7 @@ pub(super) fn lanes_beside_each_other(reader: &Reader, arms: &[Arm], lanes: &Lan
         let offset =
             |lane: &Beside| lane.curve.point_at(if lane.way == Way::Entry { 0.0 } else { f64::INFINITY }).dot(left);
         for pair in from_left.windows(2) {
-            if offset(&pair[0]) - offset(&pair[1]) < LANES_APART {
+            if offset(&pair[0]) - offset(&pair[1]) < LANES_APART - slack {
                 return Err(reader.invalid(
                     format!("arm[{index}].{}", pair[0]),
                     format_args!("{:.2} m left of the bearing at the arm's end", offset(&pair[0])),
@@ -69,7 +76,7 @@ pub(super) fn lanes_beside_each_other(reader: &Reader, arms: &[Arm], lanes: &Lan
             let until = if one.way == Way::Entry { from_left.len() } else { n_lanes };
             for other in &from_left[(first + 1).min(until)..until] {
                 let distance = |p: DVec2| other.curve.distance(p);
-                if let Some(p) = nearer(one.curve, 0.0, f64::INFINITY, LANES_APART, distance) {
+                if let Some(p) = nearer(one.curve, 0.0, f64::INFINITY, LANES_APART - slack, distance) {
                     return Err(reader.invalid(
                         format!("arm[{index}].{one}"),
                         format_args!(
@@ -123,10 +130,10 @@ fn nearer(curve: &Curve, from: f64, to: f64, limit: f64, distance: impl Fn(DVec2
     None
 }
 
-fn clear(reader: &Reader, kerbs: &Outline, curve: &Curve, key: &str) -> Result<(), Error> {
+fn clear(reader: &Reader, kerbs: &Outline, curve: &Curve, key: &str, slack: f64) -> Result<(), Error> {
     // An arm's end is a solid edge that every lane meets.
     let (from, to) = (2.0 * NEAREST, curve.length() - 2.0 * NEAREST);
-    match nearer(curve, from, to, NEAREST, |p| kerbs.signed_distance(p)) {
+    match nearer(curve, from, to, NEAREST - slack, |p| kerbs.signed_distance(p)) {
         None => Ok(()),
         Some(p) => Err(reader.invalid(
             key,

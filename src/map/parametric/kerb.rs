@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec2;
 
-use super::alignment::{Way, around, ring_arc};
+use super::alignment::{Fault, Way, around, ring_arc};
 use super::faults;
 use super::ring::Ring;
 use super::roundabout_keys::Arm;
@@ -64,8 +64,13 @@ pub(super) fn corner(reader: &Reader, ring: &Ring, arms: &[Arm], index: usize) -
         exit.lead(circle).map_err(|fault| faults::fault(reader, arms, next_index, None, "kerb", Way::Exit, fault))?;
     let between = (next.bearing - arm.bearing).rem_euclid(TAU);
     let sweep = between - leaving - arrival;
-    if !(0.0..=TAU).contains(&sweep) {
+    if sweep < 0.0 {
         return Err(faults::no_room(reader, arms, index, sweep * circle));
+    }
+    if TAU < sweep {
+        // The straight passes the ring by, and its arc comes to it from behind.
+        let (arm, way) = if arrival <= leaving { (index, Way::Entry) } else { (next_index, Way::Exit) };
+        return Err(faults::fault(reader, arms, arm, None, "kerb", way, Fault::Ring));
     }
     let mut curve = Way::Entry.placed(&inward, arm.bearing);
     if 1e-9 < sweep {

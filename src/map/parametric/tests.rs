@@ -47,6 +47,32 @@ fn the_required_keys_give_a_roundabout_with_lanes_beside_its_kerbs() {
     assert_eq!(kerbs.loops.len(), 2);
 }
 
+/// A ring of 12 m with two lanes of 2.5 m and two arms whose kerbs lie this far from their bearings (m).
+fn narrow(offset: f64) -> Result<Road, Error> {
+    let mut text = String::from("[ring]\nisland_radius = 12.0\ngutter = 0.5\nlane_width = 2.5\nlanes = 2\n");
+    for (name, bearing) in [("E", 0.0), ("W", 180.0)] {
+        text += &format!("\n[[arm]]\nname = \"{name}\"\nbearing_deg = {bearing:.1}\nlength = 150.0\n");
+        for (way, side) in [("entry", 1.0), ("exit", -1.0)] {
+            let point = format!("{{ along = 60.0, offset = {:.1} }}", side * offset);
+            text += &format!("[arm.{way}]\nlanes = 2\n[arm.{way}.kerb]\npoints = [{point}]\nring_radius = 20.0\n");
+        }
+    }
+    Road::from_toml("narrow", &text)
+}
+
+#[test]
+fn lanes_may_be_as_narrow_as_the_least_width() {
+    for offset in [16.0, 16.3, 16.5, 17.0] {
+        assert!(narrow(offset).is_ok(), "{offset}: {}", narrow(offset).unwrap_err());
+    }
+}
+
+#[test]
+fn a_kerb_that_passes_the_ring_by_is_refused_for_its_way_into_it() {
+    let message = narrow(20.0).unwrap_err().to_string();
+    assert!(message.contains("kerb.ring_radius: 20 m; no such arc leads the last straight into the ring"), "{message}");
+}
+
 #[test]
 fn every_entry_has_five_routes_with_names() {
     let names: Vec<String> =

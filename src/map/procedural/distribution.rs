@@ -98,7 +98,7 @@ impl Distribution {
         let written = drawn(&self.keys, &Draws { seed, road: index, attempt })?;
         let name = format!("{}/{seed}/{index}", self.name);
         let roundabout =
-            Road::staged(name, Reader::of(&self.file), written.clone()).map_err(|(stage, _)| match stage {
+            Road::staged(name, Reader::of(&self.file), written.clone(), 0.0).map_err(|(stage, _)| match stage {
                 Stage::Values => Reason::Values,
                 Stage::Kerbs => Reason::Kerbs,
                 Stage::Lanes => Reason::Lanes,
