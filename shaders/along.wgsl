@@ -37,7 +37,7 @@ struct Headings {
 
 // Headings once the reference point has followed these waypoints at a speed (m/s); the tractor's is without slip.
 //
-// Each half of the way between two waypoints is one straight line for the reference point and one for the fifth wheel.
+// The way between two waypoints is followed in straight pieces, two at least, none longer than the tractor's lever.
 fn followed_by(rig: Rig, speed: f32, route: Route, last: u32) -> Headings {
     let lever = 0.5 * rig.wheelbase;
     let hitch_behind = 0.5 * rig.wheelbase - rig.fifth_wheel;
@@ -47,8 +47,9 @@ fn followed_by(rig: Rig, speed: f32, route: Route, last: u32) -> Headings {
     var units = Headings(at.direction, at.direction);
     for (var index = 1u; index <= last; index++) {
         let to = waypoint_at(route.first + index);
-        for (var half = 0u; half < 2u; half++) {
-            let next = select(to.position, halfway(at, to), half == 0u);
+        let n_pieces = max(ceil(distance(at.position, to.position) / lever), 2.0);
+        for (var piece = 1u; piece <= u32(n_pieces); piece++) {
+            let next = between(at, to, f32(piece) / n_pieces);
             let turned = pulled(units.tractor, lever, next - point);
             let hitch_way = next - point - hitch_behind * (turned - units.tractor);
             units = Headings(turned, pulled(units.trailer, trailer_lever, hitch_way));
@@ -73,20 +74,24 @@ fn slip_lever(rig: Rig, speed: f32) -> f32 {
     return min(rig.slip * speed * speed, rig.slip_lever_max);
 }
 
-// Middle of the lane between two waypoints, of a cubic with their directions.
-fn halfway(behind: WaypointRow, ahead: WaypointRow) -> vec2<f32> {
-    let bulge = 0.125 * distance(behind.position, ahead.position) * (behind.direction - ahead.direction);
-    return 0.5 * (behind.position + ahead.position) + bulge;
+// A point of the lane between two waypoints, of a cubic with their directions, by the fraction of the way to the second.
+fn between(behind: WaypointRow, ahead: WaypointRow, fraction: f32) -> vec2<f32> {
+    let rest = 1.0 - fraction;
+    let bulge = rest * behind.direction - fraction * ahead.direction;
+    let shift = (distance(behind.position, ahead.position) * rest * fraction) * bulge;
+    return behind.position + (fraction * fraction * (3.0 - 2.0 * fraction)) * (ahead.position - behind.position) + shift;
 }
 
-// Heading of a unit of a length (m), from its front end to where it rolls, once its front end has gone this way (m) in
-// a straight line. It then lies on a tractrix: the tangent of half its angle to the line falls exponentially.
+// Heading of a unit of a length (m), from its front end to where it rolls, once its front end has gone this way (m),
+// which is a straight piece of a bend. On a line the unit lies on a tractrix: the tangent of half its angle to the line
+// falls exponentially with the way. Here it falls by the exponential's approximation of order (1, 1), with which units
+// on the chords of a circle come to the angle that they have on the circle.
 fn pulled(heading: vec2<f32>, unit_length: f32, way: vec2<f32>) -> vec2<f32> {
     let gone = length(way);
     if gone < TINY { return heading; }
     let line = way / gone;
     let tangent = dot(perpendicular(line), heading) / max(1.0 + dot(line, heading), HALVED_MIN);
-    let half = tangent * exp(-gone / unit_length);
+    let half = tangent * max((2.0 * unit_length - gone) / (2.0 * unit_length + gone), 0.0);
     let turned = vec2<f32>(1.0 - half * half, 2.0 * half) / (1.0 + half * half);
     return rotated(line, turned);
 }

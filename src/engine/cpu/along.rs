@@ -52,15 +52,16 @@ struct Headings {
 
 /// Headings once the reference point has followed these waypoints at a speed (m/s); the tractor's is without slip.
 ///
-/// Each half of the way between two waypoints is one straight line for the reference point and one for the fifth wheel.
-/// On a circle of 12 m, with waypoints 2 m apart, both are within a third of a degree.
+/// The way between two waypoints is followed in straight pieces, two at least, none longer than the tractor's lever.
 fn followed_by(rig: &Rig, speed: f32, waypoints: &[WaypointRow]) -> Headings {
     let (lever, hitch_behind) = (0.5 * rig.wheelbase, 0.5 * rig.wheelbase - rig.fifth_wheel);
     let trailer_lever = rig.trailer_wheelbase - slip_lever(rig, speed);
     let mut point = waypoints[0].position;
     let mut units = Headings { tractor: waypoints[0].direction, trailer: waypoints[0].direction };
     for pair in waypoints.windows(2) {
-        for next in [halfway(&pair[0], &pair[1]), pair[1].position] {
+        let n_pieces = (pair[0].position.distance(pair[1].position) / lever).ceil().max(2.0);
+        for piece in 1..=n_pieces as u32 {
+            let next = between(&pair[0], &pair[1], piece as f32 / n_pieces);
             let turned = pulled(units.tractor, lever, next - point);
             let hitch_way = next - point - hitch_behind * (turned - units.tractor);
             units = Headings { tractor: turned, trailer: pulled(units.trailer, trailer_lever, hitch_way) };
@@ -84,14 +85,18 @@ fn slip_lever(rig: &Rig, speed: f32) -> f32 {
     (rig.slip * speed * speed).min(rig.slip_lever_max)
 }
 
-/// Middle of the lane between two waypoints, of a cubic with their directions.
-fn halfway(behind: &WaypointRow, ahead: &WaypointRow) -> Vec2 {
-    let bulge = 0.125 * behind.position.distance(ahead.position) * (behind.direction - ahead.direction);
-    0.5 * (behind.position + ahead.position) + bulge
+/// A point of the lane between two waypoints, of a cubic with their directions, by the fraction of the way to the second.
+fn between(behind: &WaypointRow, ahead: &WaypointRow, fraction: f32) -> Vec2 {
+    let rest = 1.0 - fraction;
+    let bulge = rest * behind.direction - fraction * ahead.direction;
+    let shift = (behind.position.distance(ahead.position) * rest * fraction) * bulge;
+    behind.position + (fraction * fraction * (3.0 - 2.0 * fraction)) * (ahead.position - behind.position) + shift
 }
 
-/// Heading of a unit of a length (m), from its front end to where it rolls, once its front end has gone this way (m) in
-/// a straight line. It then lies on a tractrix: the tangent of half its angle to the line falls exponentially.
+/// Heading of a unit of a length (m), from its front end to where it rolls, once its front end has gone this way (m),
+/// which is a straight piece of a bend. On a line the unit lies on a tractrix: the tangent of half its angle to the line
+/// falls exponentially with the way. Here it falls by the exponential's approximation of order (1, 1), with which units
+/// on the chords of a circle come to the angle that they have on the circle.
 fn pulled(heading: Vec2, unit_length: f32, way: Vec2) -> Vec2 {
     let gone = way.length();
     if gone < TINY {
@@ -99,7 +104,7 @@ fn pulled(heading: Vec2, unit_length: f32, way: Vec2) -> Vec2 {
     }
     let line = way / gone;
     let tangent = line.perp_dot(heading) / (1.0 + line.dot(heading)).max(HALVED_MIN);
-    let half = tangent * (-gone / unit_length).exp();
+    let half = tangent * ((2.0 * unit_length - gone) / (2.0 * unit_length + gone)).max(0.0);
     let turned = Vec2::new(1.0 - half * half, 2.0 * half) / (1.0 + half * half);
     line.rotate(turned)
 }
@@ -150,6 +155,24 @@ mod tests {
             println!("{radius}: {off:?} of {steady:?}");
             // Half a degree, and a fiftieth of the load.
             assert!(off.iter().zip([9e-3, 9e-3, 9e-3, 2e-3, 0.02]).all(|(off, most)| off.abs() < most), "{off:?}");
+        }
+    }
+
+    #[test]
+    fn wheels_stand_as_a_turn_asks_for_whatever_the_distance_between_waypoints() {
+        let world = World::bake(&Scenario::named("attard2023").unwrap()).unwrap();
+        for (wheelbase, spacing) in [(2.0, 0.5), (2.0, 2.0), (2.0, 5.0), (3.6, 2.0), (3.6, 5.0), (6.0, 5.0)] {
+            let rig = Rig { wheelbase, slip: 0.0, slip_lever_max: 0.0, ..world.rigs[0] };
+            let radius = 20.0;
+            let at = |index: i32| {
+                let out = direction(wrapped(spacing * index as f32 / radius));
+                WaypointRow { position: radius * out, direction: out.perp() }
+            };
+            let waypoints: Vec<WaypointRow> = (0..(6.0 * radius / spacing) as i32).map(at).collect();
+            let found = standing_at(&rig, 3.0, &waypoints);
+            // The reference point, half a wheelbase ahead of the drive axle, is on the circle.
+            let expected = (wheelbase / (radius * radius - wheelbase * wheelbase / 4.0).sqrt()).atan();
+            assert!((found.steering / expected - 1.0).abs() < 0.01, "{wheelbase} {spacing}: {found:?} {expected}");
         }
     }
 
