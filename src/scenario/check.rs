@@ -30,6 +30,8 @@ const NEGATIVE: [f64; 2] = [-1e9, -1e-6];
 const LOCK: [f64; 2] = [1e-3, 1.5];
 /// Longest steer delay (steps): a truck's control goes back so far.
 pub(super) const MOST_DELAY: f64 = 3.0;
+/// Shortest sub-step (s).
+const SHORTEST_SUBSTEP: f64 = 1e-3;
 
 impl Scenario {
     /// An error if the scenario has a value with which no truck could be stepped.
@@ -82,6 +84,7 @@ impl Scenario {
         if self.observes_vehicles && self.traffic.is_none() {
             return Err(invalid("observes_vehicles", true, "with traffic: without it there are none to observe"));
         }
+        within("n_substeps", f64::from(self.n_substeps), self.substeps())?;
         within("vehicle.model.steer_delay", self.longest_steer_delay(), [0.0, MOST_DELAY * self.step])
     }
 
@@ -89,6 +92,19 @@ impl Scenario {
     pub(super) fn longest_steer_delay(&self) -> f64 {
         let drawn = self.fleet.iter().flat_map(|fleet| fleet.extremes().map(|(_, vehicle)| vehicle.model.steer_delay));
         drawn.fold(self.vehicle.model.steer_delay, f64::max)
+    }
+
+    /// Fewest and most sub-steps of a step. In too long a sub-step a fast truck goes farther than a short trailer is
+    /// long, and its motion diverges; in too short a one it goes less far than positions in single precision tell.
+    pub(super) fn substeps(&self) -> [f64; 2] {
+        let lever = |vehicle: &Vehicle| vehicle.trailer.wheelbase - vehicle.model.slip_lever;
+        let drawn = self.fleet.iter().flat_map(|fleet| fleet.extremes().map(|(_, vehicle)| lever(&vehicle)));
+        let shortest = drawn.fold(lever(&self.vehicle), f64::min);
+        let fastest = self.start_speed.iter().flatten().copied().fold(self.cruising_speed(), f64::max);
+        [
+            (fastest * self.step / shortest - 1e-9).ceil().max(1.0),
+            (self.step / SHORTEST_SUBSTEP + 1e-9).floor().max(1.0),
+        ]
     }
 
     fn check_numbers(&self) -> Result<(), Invalid> {

@@ -50,6 +50,13 @@ impl Scenario {
             let expected = format!("the vehicle's steer delay is up to {delay} s; three steps at most");
             return Err(reader.invalid("time.step", format_args!("{} s", scenario.step), expected));
         }
+        let [fewest, most] = scenario.substeps();
+        if !(fewest..=most).contains(&f64::from(scenario.n_substeps)) {
+            let expected = format!(
+                "must lie in {fewest}..{most}: at most the trailer's lever is driven in a sub-step, which takes 1 ms at least"
+            );
+            return Err(reader.invalid("time.substeps", scenario.n_substeps, expected));
+        }
         if scenario.traffic.is_some() && scenario.step as f32 != crate::traffic::STEP {
             let expected = format!("with [traffic] {} s", crate::traffic::STEP);
             return Err(reader.invalid("time.step", format_args!("{} s", scenario.step), expected));

@@ -15,6 +15,8 @@ use crate::vehicle::GRAVITY;
 const LOAD_TRANSFER_MAX: f64 = 0.7;
 /// Fraction of the tyres' grip that a bend may take: what is left is for steering.
 const GRIP_MAX: f64 = 0.8;
+/// Least that a road's fall leaves of what the trailer's load holds, so that a truck that it nearly tips crawls (m/s^2).
+const HELD_MIN: f64 = 0.005 * GRAVITY;
 /// Mean braking that the speed control reaches where it asks for more as the error grows (m/s^2).
 const BRAKING: f64 = 1.2;
 /// Lowest speed of a profile whose highest is not lower still (m/s).
@@ -78,7 +80,7 @@ fn limits(rig: &Rig, waypoints: &[WaypointRow], lengths: &[f64]) -> Vec<f64> {
             articulation += turned - followed;
         }
         // A road that falls to the right takes from what a bend to the left may have, and gives it to one to the right.
-        let held = (level - articulation.signum() * fall).max(0.05 * GRAVITY);
+        let held = (level - articulation.signum() * fall).max(HELD_MIN);
         let trailer_curvature = (articulation.sin() * articulation.cos()).abs() / f64::from(rig.trailer_wheelbase);
         (grip / curvature.max(1e-6)).min(held / trailer_curvature.max(1e-6)).sqrt()
     };

@@ -78,6 +78,9 @@ fn a_scenario_changed_in_memory_is_checked_before_it_is_baked() {
     assert!(refused(|scenario| scenario.places.clear()).starts_with("places: no routes; "));
     assert!(refused(|scenario| scenario.places[0].routes[0].waypoints.truncate(1)).contains("1 waypoints; at least 2"));
     assert!(refused(|scenario| scenario.n_substeps = 0).starts_with("n_substeps: 0; "));
+    let coarse = refused(|scenario| (scenario.step, scenario.n_substeps) = (1.0, 1));
+    assert_eq!(coarse, "n_substeps: 1; must lie in 2..1000");
+    assert_eq!(refused(|scenario| scenario.n_substeps = 101), "n_substeps: 101; must lie in 1..100");
     assert!(refused(|scenario| scenario.cell = 1e-9).starts_with("cell: 0.000000001; "));
 }
 

@@ -141,7 +141,7 @@ fn drawn(reader: &Reader, members: Vec<Member>, written: &WrittenDraw) -> Result
         return Err(reader.invalid("draw.n_vehicles", value, expected));
     }
     for (member, vehicle) in fleet.extremes() {
-        check_vehicle(&vehicle).and_then(|()| check_drawn(&vehicle)).map_err(|wrong| {
+        check_drawn(&vehicle).and_then(|()| check_vehicle(&vehicle)).map_err(|wrong| {
             let expected = format!("of {} with all ranges at their ends: {}", member.name, wrong.expected);
             reader.invalid("draw", format_args!("{}: {}", wrong.key, wrong.value), expected)
         })?;
