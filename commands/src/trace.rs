@@ -1,6 +1,7 @@
 //! `offtrack trace`: drives the trajectory cases of a file with the simulator's equations of motion and prints the
 //! states asked for.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use offtrack::files::reader::{read_text, shortened, shown_path};
@@ -32,6 +33,9 @@ pub struct Args {
 struct Report {
     cases: Vec<Traced>,
     skipped: Vec<Skipped>,
+    /// Keys of vehicles that no trajectory uses.
+    #[serde(skip)]
+    ignored: BTreeSet<String>,
 }
 
 /// A case of a kind that is not a truck's trajectory.
@@ -52,6 +56,11 @@ pub fn run(args: &Args) -> Result<(), Error> {
             shown_path(&args.cases)
         ));
     }
+    if !report.ignored.is_empty() {
+        let keys: Vec<&str> = report.ignored.iter().map(String::as_str).collect();
+        let keys = shortened(&keys.join(", "), 400);
+        files::say(&format!("{}: keys of `vehicle` that no trajectory uses: {keys}", shown_path(&args.cases)));
+    }
     match &args.output {
         Some(file) => files::write_json(file, &report),
         None => {
@@ -70,7 +79,7 @@ fn report(file: &Path) -> Result<Report, Error> {
     let cases = written["cases"]
         .as_array()
         .ok_or_else(|| wrong("cases: missing or not a list; a list of cases is needed".to_owned()))?;
-    let mut report = Report { cases: Vec::new(), skipped: Vec::new() };
+    let mut report = Report { cases: Vec::new(), skipped: Vec::new(), ignored: BTreeSet::new() };
     for (index, case) in cases.iter().enumerate() {
         let text = |key: &str| {
             let text = case[key].as_str().map(str::to_owned);
@@ -81,6 +90,7 @@ fn report(file: &Path) -> Result<Report, Error> {
         let (id, kind) = (text("id")?, text("kind")?);
         if kind == "trajectory" {
             let case = Case::deserialize(case).map_err(|error| wrong(format!("case {id:?}: {error}")))?;
+            report.ignored.extend(case.vehicle.ignored.keys().cloned());
             report.cases.push(trace(&case).map_err(|error| wrong(error.to_string()))?);
         } else {
             report.skipped.push(Skipped { id, kind });
@@ -102,6 +112,7 @@ mod tests {
         let report = report(&vectors()).unwrap();
         assert_eq!((report.cases.len(), report.skipped.len()), (22, 8));
         assert_eq!(report.skipped[0].kind, "closed_form");
+        assert!(report.ignored.contains("v_max") && !report.ignored.contains("L1"), "{:?}", report.ignored);
         let printed = serde_json::to_value(&report).unwrap();
         let state = printed["cases"][0]["states"][1].as_object().unwrap();
         let keys = "t x y psi1 psi2 gamma v delta hitch trailer_axle ay1 ay2 ltr1_qs ltr2_qs ltr2_dyn";

@@ -153,7 +153,8 @@ impl Run<'_> {
     fn new(case: &Case) -> Run<'_> {
         let init = &case.init;
         let truck = Truck {
-            position: Vec2::new(init.x as f32, init.y as f32),
+            // From where it begins: so far from the origin as a case may be, single precision would lose its way.
+            position: Vec2::ZERO,
             heading: wrapped(init.psi1 as f32),
             trailer_heading: wrapped(init.psi2 as f32),
             speed: init.v as f32,
@@ -235,7 +236,8 @@ impl Run<'_> {
     fn state(&self) -> State {
         let Moving { truck, motion } = &self.moving;
         let vehicle = &self.case.vehicle;
-        let (x, y) = (f64::from(truck.position.x), f64::from(truck.position.y));
+        let Init { x, y, .. } = self.case.init;
+        let (x, y) = (x + f64::from(truck.position.x), y + f64::from(truck.position.y));
         let hitch = [x + vehicle.a * self.psi1.cos(), y + vehicle.a * self.psi1.sin()];
         let (ay1, ay2) = (f64::from(motion.lateral_acceleration), f64::from(motion.trailer_lateral_acceleration));
         let trailer_roll = Vec2::new(truck.trailer_roll, truck.trailer_roll_rate);

@@ -1,11 +1,13 @@
 //! A case as written in its file, and the checks before it is driven.
 
+use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
 use offtrack::files::reader::{shortened, shown};
 use offtrack::layout::{Lag, Rig};
 use offtrack::vehicle::{GRAVITY, SLIP_LEVER, Suspension};
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 
 /// Lateral acceleration (m/s^2) and power (W/kg) far beyond any truck's, for cases without friction or power.
 const UNLIMITED: f32 = 1e6;
@@ -133,6 +135,9 @@ pub struct CaseVehicle {
     /// Speed control: strongest braking, negative (m/s^2).
     #[serde(default = "speed_braking")]
     pub brake: f64,
+    /// Keys that no trajectory uses.
+    #[serde(flatten)]
+    pub ignored: BTreeMap<String, IgnoredAny>,
 }
 
 /// Initial state of a case.
@@ -262,7 +267,9 @@ impl Case {
         let vehicle = &self.vehicle;
         let (any, positive, speed) = (-1e5..=1e5, 1e-3..=1e3, -60.0..=60.0);
         self.within("dt", self.dt, 1e-4..=0.2, "s")?;
-        self.within("control_step", self.control_step, self.dt..=10.0, "s")?;
+        if self.commands.iter().any(|command| command.v_cmd.is_some()) {
+            self.within("control_step", self.control_step, self.dt..=10.0, "s")?;
+        }
         self.within("vehicle.kp", vehicle.kp, 0.0..=100.0, "1/s")?;
         self.within("vehicle.ki", vehicle.ki, 0.0..=100.0, "1/s^2")?;
         self.within("vehicle.band", vehicle.band, 0.0..=100.0, "m/s")?;
@@ -281,6 +288,9 @@ impl Case {
         self.within("vehicle.crossfall", vehicle.crossfall, -0.5..=0.5, "")?;
         self.within("vehicle.K", vehicle.K, 0.0..=1.0, "rad/(m/s^2)")?;
         self.within("vehicle.mu", vehicle.mu.unwrap_or(1.0), 0.0..=10.0, "")?;
+        if vehicle.ellipse && vehicle.mu.is_none() {
+            return Err(self.refused("vehicle.ellipse", "true", "needs vehicle.mu, the grip that it shares out"));
+        }
         self.within("vehicle.delta_max", vehicle.delta_max, 0.0..=1.5, "rad")?;
         self.within("vehicle.delta_rate", vehicle.delta_rate, 0.0..=1e3, "rad/s")?;
         self.within("vehicle.a_max", vehicle.a_max, 0.0..=100.0, "m/s^2")?;
@@ -334,11 +344,10 @@ impl Case {
         } else {
             format!("must lie in {}..{}{unit}", shown(*range.start()), shown(*range.end()))
         };
-        Err(Error {
-            id: self.id.clone(),
-            key: key.to_owned(),
-            value: format!("{}{unit}", shown(value)),
-            expected: limits,
-        })
+        Err(self.refused(key, format!("{}{unit}", shown(value)), limits))
+    }
+
+    fn refused(&self, key: &str, value: impl Into<String>, expected: impl Into<String>) -> Error {
+        Error { id: self.id.clone(), key: key.to_owned(), value: value.into(), expected: expected.into() }
     }
 }
