@@ -51,10 +51,10 @@ def checked_integer(name: str, value: int) -> int:
 
 
 def within(name: str, value: int, low: int, high: int) -> int:
-    """The value as an integer, if it lies in ``low..high``."""
+    """The value as an integer, if it lies in ``low..high``, the last not included."""
     index = checked_integer(name, value)
     if not low <= index < high:
-        raise ValueError(f"{name}: {index}; must lie in {low}..{high}")
+        raise ValueError(f"{name}: {index}; must lie in {low}..{high - 1}")
     return index
 
 

@@ -268,7 +268,7 @@ class Batch(_offtrack.Batch):
         indices = list(range(self.num_envs)) if envs is None else self._indices(envs)
         outside = next((env for env in indices if not 0 <= env < self.num_envs), None)
         if outside is not None:
-            raise ValueError(f"envs: {outside}; the batch has trucks 0..{self.num_envs}")
+            raise ValueError(f"envs: {outside}; the batch has trucks 0..{self.num_envs - 1}")
         check_once("envs", indices)
         if seeds is not None and streams is not None:
             raise ValueError("seeds, streams: give one of them")

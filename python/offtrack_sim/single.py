@@ -49,7 +49,8 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], Any]):
         scenario: Benchmark, as for :class:`offtrack_sim.Batch`.
         split: Routes that episodes are drawn from.
         routes: Names of routes or roundabouts in place of a split.
-        render_mode: None, or ``"rgb_array"`` for pictures of ``render_size`` pixels a side.
+        render_mode: None, or ``"rgb_array"`` for pictures.
+        render_size: Side of a picture [px].
         device: ``"cpu"``, ``"gpu"`` or part of an adapter's name.
         numeric_infos: Whether infos have indices in place of names, ``route`` in ``batch.route_names`` and ``vehicle``
             in ``batch.vehicle_classes``, as ``gymnasium.wrappers.NumpyToTorch`` needs them.
@@ -148,7 +149,7 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], Any]):
             raise TypeError(f"action: {action!r}; an integer is needed") from None
         n_actions = len(self.batch.action_table)
         if not 0 <= index < n_actions:
-            raise ValueError(f"action: {index}; must lie in 0..{n_actions}")
+            raise ValueError(f"action: {index}; must lie in 0..{n_actions - 1}")
         return np.array([index])
 
     def _named(self, route: np.int64, vehicle: np.int64) -> dict[str, Any]:

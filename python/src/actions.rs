@@ -9,6 +9,8 @@ use offtrack::world::World;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
+use crate::arrays::aligned;
+
 /// Steer angle and speed of each action, or of commands of -1 and of 1, `[n_actions, 2]`.
 pub fn table<'py>(py: Python<'py>, actions: &[Action]) -> PyResult<Bound<'py, PyArray2<f32>>> {
     let rows: Vec<f32> = actions.iter().flat_map(|action| [action.steering, action.speed]).collect();
@@ -59,6 +61,10 @@ impl OfCommands {
                 "actions: shape ({rows}, {columns}); ({n_envs}, {n_commands}) is needed, a row a truck"
             ))));
         }
+        let array = match aligned(array) {
+            Ok(array) => array,
+            Err(error) => return Some(Err(error)),
+        };
         let mut commands = vec![Command::default(); n_envs];
         for ((env, index), &given) in array.as_array().indexed_iter() {
             let value: f64 = given.into();
@@ -113,9 +119,13 @@ impl Of {
                 array.len()
             ))));
         }
+        let array = match aligned(array) {
+            Ok(array) => array,
+            Err(error) => return Some(Err(error)),
+        };
         let known = |(env, &action): (usize, &T)| match u32::try_from(action) {
             Ok(index) if index < limit => Ok(index),
-            _ => Err(PyValueError::new_err(format!("actions[{env}]: {action}; must lie in 0..{limit}"))),
+            _ => Err(PyValueError::new_err(format!("actions[{env}]: {action}; must lie in 0..{}", limit - 1))),
         };
         Some(array.as_array().iter().enumerate().map(known).collect())
     }

@@ -160,8 +160,8 @@ def test_wrong_starts_are_refused_and_begin_nothing() -> None:
     batch = Batch("laden2026", 2)
     before = batch.state()
     wrong: list[tuple[Any, type[Exception], str]] = [
-        (Start(vehicle=4096), ValueError, r"starts\[1\].vehicle: 4096; must lie in 0..4096"),
-        (Start(vehicle=-1), ValueError, r"starts\[1\].vehicle: -1; must lie in 0..4096"),
+        (Start(vehicle=4096), ValueError, r"starts\[1\].vehicle: 4096; must lie in 0..4095"),
+        (Start(vehicle=-1), ValueError, r"starts\[1\].vehicle: -1; must lie in 0..4095"),
         (Start(vehicle=cast(Any, "daf_xf")), TypeError, r"starts\[1\].vehicle: 'daf_xf'; an integer is needed"),
         (
             Start(vehicle=("daf_xf", "wet")),

@@ -83,7 +83,7 @@ def test_what_a_function_raises_and_an_action_that_there_is_none_of_end_an_evalu
 
     with pytest.raises(KeyError, match="of the policy itself"):
         evaluate(failing, episodes=1)
-    with pytest.raises(ValueError, match=r"actions\[0\]: 9; must lie in 0..9"):
+    with pytest.raises(ValueError, match=r"actions\[0\]: 9; must lie in 0..8"):
         evaluate(lambda observations: np.full(len(observations), 9), episodes=1)
 
 

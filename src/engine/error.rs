@@ -68,7 +68,7 @@ pub enum Error {
     #[error("routes: empty; at least 1 route is needed")]
     NoRoutes,
     /// A vehicle that the world does not have.
-    #[error("vehicles: {vehicle}; the world has vehicles 0..{n_vehicles}")]
+    #[error("vehicles: {vehicle}; the world has vehicles 0..{}", .n_vehicles - 1)]
     UnknownVehicle {
         /// The index.
         vehicle: u32,
@@ -76,7 +76,7 @@ pub enum Error {
         n_vehicles: usize,
     },
     /// A route that the world does not have.
-    #[error("routes: {route}; the world has routes 0..{n_routes}")]
+    #[error("routes: {route}; the world has routes 0..{}", .n_routes - 1)]
     UnknownRoute {
         /// The index asked for.
         route: u32,
@@ -137,7 +137,7 @@ pub enum Error {
         fraction: String,
     },
     /// A row that the batch does not have.
-    #[error("indices[{position}]: {index}; the batch has trucks 0..{n_envs}")]
+    #[error("indices[{position}]: {index}; the batch has trucks 0..{}", .n_envs - 1)]
     UnknownTruck {
         /// Position of the unknown truck's index among the indices.
         position: usize,

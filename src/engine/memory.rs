@@ -7,9 +7,20 @@ use std::fs;
 /// Memory of the host that can be used without ending another's work, where the system says so (bytes).
 pub fn available() -> Option<u64> {
     let free = fs::read_to_string("/proc/meminfo").ok().and_then(|text| mem_available(&text));
-    // A container may be granted less than the machine has.
-    let granted = fs::read_to_string("/sys/fs/cgroup/memory.max").ok().and_then(|text| text.trim().parse().ok());
-    [free, granted, address_space()].into_iter().flatten().min()
+    [free, container(), address_space()].into_iter().flatten().min()
+}
+
+/// What a container leaves of the memory that it is granted, which may be less than the machine has (bytes).
+fn container() -> Option<u64> {
+    let read = |file: &str| fs::read_to_string(format!("/sys/fs/cgroup/memory.{file}")).ok();
+    let number = |file: &str| read(file)?.trim().parse::<u64>().ok();
+    let reclaimable = read("stat").and_then(|text| inactive_file(&text)).unwrap_or(0);
+    Some(number("max")?.saturating_sub(number("current").unwrap_or(0).saturating_sub(reclaimable)))
+}
+
+/// What a container caches of files and gives back when asked, of its `memory.stat` (bytes).
+fn inactive_file(text: &str) -> Option<u64> {
+    text.lines().find_map(|line| line.strip_prefix("inactive_file "))?.trim().parse().ok()
 }
 
 /// What a limit of the process's address space leaves, as `ulimit -v` sets one (bytes).
@@ -38,7 +49,7 @@ fn kilobytes(text: &str, key: &str) -> Option<u64> {
 
 #[cfg(test)]
 mod tests {
-    use super::{address_limit, mem_available};
+    use super::{address_limit, inactive_file, mem_available};
 
     #[test]
     fn available_memory_is_read_in_bytes() {
@@ -46,6 +57,13 @@ mod tests {
         assert_eq!(mem_available("MemTotal: 2048 kB\n"), None);
         assert_eq!(mem_available("MemAvailable: much\n"), None);
     }
+
+    #[test]
+    fn what_a_container_caches_of_files_is_read_in_bytes() {
+        assert_eq!(inactive_file("anon 7\ninactive_file 4096\nactive_file 3\n"), Some(4096));
+        assert_eq!(inactive_file("anon 7\n"), None);
+    }
+
     #[test]
     fn a_limit_of_the_address_space_is_read_in_bytes() {
         let limits = |soft: &str| {

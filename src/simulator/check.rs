@@ -62,7 +62,7 @@ pub(super) fn check_group(world: &World, env: usize, routes: &[u32]) -> Result<(
     if n_lanes == group {
         Ok(())
     } else {
-        Err(Error::NarrowGroup { road: format!("one road for trucks {env}..{}", env + group), n_lanes, group })
+        Err(Error::NarrowGroup { road: format!("one road for trucks {env}..{}", env + group - 1), n_lanes, group })
     }
 }
 

@@ -214,17 +214,21 @@ fn within<T: PartialOrd + Debug>(
     limits::within(|| format!("{}[{env}]{field}", column.name()), value, range)
 }
 
-/// An error if trucks of a group are on several roads, or in other episodes.
+/// An error if trucks of a group are on several roads, in other episodes, or not as long on their way.
 fn check_groups(world: &World, batch: &Batch) -> Result<(), Error> {
     for (index, trucks) in batch.truck.chunks(world.group()).enumerate() {
         let road = |truck: &Truck| world.routes[truck.route as usize].roundabout;
+        let running = trucks.iter().find(|truck| truck.held == 0);
         for (n, truck) in trucks.iter().enumerate() {
             let env = index * trucks.len() + n;
             if road(truck) != road(&trucks[0]) {
-                let limit = format!("routes of one road in trucks {}..{}", env - n, env - n + trucks.len());
+                let limit = format!("routes of one road in trucks {}..{}", env - n, env - n + trucks.len() - 1);
                 return Err(Error::OutsideWorld { column: Column::Truck.name(), env, found: truck.route, limit });
             }
             within(Column::Truck, env, ".episode", truck.episode, trucks[0].episode..=trucks[0].episode)?;
+            if let Some(first) = running.filter(|_| truck.held == 0) {
+                within(Column::Truck, env, ".steps", truck.steps, first.steps..=first.steps)?;
+            }
         }
     }
     Ok(())
@@ -236,16 +240,16 @@ fn check_indices(world: &World, batch: &Batch) -> Result<(), Error> {
     // Where actions are continuous the column is not used: zeros.
     let n_actions = world.params.n_actions.max(1);
     if let Some((env, &found)) = batch.action.iter().enumerate().find(|&(_, &action)| n_actions <= action) {
-        let limit = format!("actions 0..{n_actions}");
+        let limit = format!("actions 0..{}", n_actions - 1);
         return Err(Error::OutsideWorld { column: Column::Action.name(), env, found, limit });
     }
     for (env, (truck, progress)) in batch.truck.iter().zip(&batch.progress).enumerate() {
         let Some(route) = world.routes.get(truck.route as usize) else {
-            let limit = format!("routes 0..{}", world.routes.len());
+            let limit = format!("routes 0..{}", world.routes.len() - 1);
             return Err(Error::OutsideWorld { column: Column::Truck.name(), env, found: truck.route, limit });
         };
         if world.rigs.len() <= truck.vehicle as usize {
-            let limit = format!("vehicles 0..{}", world.rigs.len());
+            let limit = format!("vehicles 0..{}", world.rigs.len() - 1);
             return Err(Error::OutsideWorld { column: Column::Truck.name(), env, found: truck.vehicle, limit });
         }
         if route.n_waypoints < progress.waypoint {

@@ -152,8 +152,8 @@ fn an_episode_begins_on_the_stated_route_at_the_stated_start_and_the_next_one_is
         assert!(truck.route < 3 && truck.episode == 2, "{name}: {truck:?}");
         let before = rows(simulator.batch());
         for (wrong, message) in [
-            (Begin { env: 4, ..Begin::default() }, "indices[1]: 4; the batch has trucks 0..4".to_owned()),
-            (Begin { route: Some(75), ..Begin::default() }, "routes: 75; the world has routes 0..75".to_owned()),
+            (Begin { env: 4, ..Begin::default() }, "indices[1]: 4; the batch has trucks 0..3".to_owned()),
+            (Begin { route: Some(75), ..Begin::default() }, "routes: 75; the world has routes 0..74".to_owned()),
             (
                 Begin { start: Some(Start { offset: f32::NAN, heading: 0.0, ..Start::default() }), ..Begin::default() },
                 "starts[0].offset: NaN; must lie in -1..1, a fraction of the largest error or range".to_owned(),

@@ -366,7 +366,7 @@ fn a_batch_that_cannot_be_is_refused_and_a_wrong_action_changes_nothing() {
             refused(&[start(f32::NAN), start(0.0)]).to_string(),
             "starts[0].offset: NaN; must lie in -1..1, a fraction of the largest error or range"
         );
-        assert_eq!(simulator.gather(&[1, 2]).unwrap_err().to_string(), "indices[1]: 2; the batch has trucks 0..2");
+        assert_eq!(simulator.gather(&[1, 2]).unwrap_err().to_string(), "indices[1]: 2; the batch has trucks 0..1");
         assert_eq!(simulator.gather(&[]).unwrap_err(), simulator::Error::EmptyBatch);
         assert_eq!(simulator.batch().truck, before);
     }

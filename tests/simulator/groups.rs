@@ -127,7 +127,17 @@ fn a_batch_that_is_restored_goes_on_and_states_that_no_group_can_have_are_refuse
         world.routes.iter().position(|route| route.roundabout != world.routes[kept.truck[4].route as usize].roundabout);
     apart.truck[5].route = other.unwrap() as u32;
     let message = again.restore(|column| Some(apart.column(column))).unwrap_err().to_string();
-    assert!(message.contains("truck") && message.contains("routes of one road in trucks 4..8"), "{message}");
+    assert!(message.contains("truck") && message.contains("routes of one road in trucks 4..7"), "{message}");
+    // Two of a group that are on their way from the same step on.
+    let pairs = (0..16).flat_map(|env| (env + 1..(env / 4 + 1) * 4).map(move |mate| (env, mate)));
+    let is_running = |env: usize| kept.truck[env].held == 0;
+    let (env, mate) = pairs.into_iter().find(|&(env, mate)| is_running(env) && is_running(mate)).unwrap();
+    let mut apart = kept.clone();
+    apart.truck[mate].steps += 1;
+    let message = again.restore(|column| Some(apart.column(column))).unwrap_err().to_string();
+    let steps = kept.truck[env].steps;
+    let expected = format!("truck[{mate}].steps: {}; must lie in {steps}..{steps}", steps + 1);
+    assert!(message.contains(&expected), "{message}");
 }
 
 /// Two trucks of a group on the 20m roundabout, on routes of these names.
@@ -299,7 +309,7 @@ fn trucks_of_a_group_are_begun_together_and_on_routes_that_go_together() {
     let error = simulator.begin(&[begin(1, None)]).unwrap_err();
     assert_eq!(error, Error::PartOfGroup { env: 0, group: 2 });
     let message = simulator.begin(&[begin(0, of("20m/N-left-2")), begin(1, of("20m/N-left-4"))]).unwrap_err();
-    assert!(message.to_string().contains("1 lanes of one road for trucks 0..2"), "{message}");
+    assert!(message.to_string().contains("1 lanes of one road for trucks 0..1"), "{message}");
     let message = simulator.begin(&[begin(0, of("20m/N-left-2")), begin(1, of("40m/E-left-1"))]).unwrap_err();
     assert!(matches!(message, Error::NarrowGroup { .. }), "{message}");
     simulator.begin(&[begin(0, of("20m/N-right-2")), begin(1, of("20m/N-left-4"))]).unwrap();

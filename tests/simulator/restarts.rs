@@ -101,7 +101,7 @@ fn later_episodes_draw_from_the_new_routes_and_wrong_ones_change_nothing() {
         let before = rows(simulator.batch());
         for (routes, expected) in [
             (vec![0, 1], "routes: 2 to draw from; this batch draws from 3, and needs as many".to_owned()),
-            (vec![0, 1, n_routes as u32], format!("routes: {n_routes}; the world has routes 0..{n_routes}")),
+            (vec![0, 1, n_routes as u32], format!("routes: {n_routes}; the world has routes 0..{}", n_routes - 1)),
         ] {
             assert_eq!(simulator.draw_from(&routes).unwrap_err().to_string(), expected, "{name}");
         }

@@ -273,8 +273,9 @@ pub fn actions(text: &str, n_actions: u32, limit: usize) -> Result<Vec<u32>, Str
             }
             _ => {
                 return Err(format!(
-                    "actions: {}; runs like 4x12 are needed, of actions 0..{n_actions}, {MOST_STEPS} steps at most",
-                    shortened(&format!("{run:?}"), 40)
+                    "actions: {}; runs like 4x12 are needed, of actions 0..{}, {MOST_STEPS} steps at most",
+                    shortened(&format!("{run:?}"), 40),
+                    n_actions - 1
                 ));
             }
         }
@@ -299,7 +300,10 @@ mod tests {
     fn a_wrong_run_of_actions_is_named() {
         for wrong in ["9x1", "4", "4x", "x4", "-1x2", "4x1000001", "4x1000000 4x1", "4x99999999999999999999"] {
             let said = actions(wrong, 9, 10).unwrap_err();
-            assert!(said.contains(wrong.split(' ').next_back().unwrap()) && said.contains("0..9"), "{said}");
+            assert!(
+                said.contains(wrong.split(' ').next_back().unwrap()) && said.contains("of actions 0..8, "),
+                "{said}"
+            );
         }
     }
 }
