@@ -36,7 +36,7 @@ pub mod physics {
     pub use crate::engine::cpu::drive::{Motion, Moving, drive_max, driven, load_transfer_ratio, motion_of, moved};
     pub use crate::engine::cpu::follow::{distance_to_segment, reference_point};
     pub use crate::engine::cpu::judge::{closeness, depth_on_apron, rewarded};
-    pub use crate::engine::cpu::observe::observed;
+    pub use crate::engine::cpu::observe::{SPEED_SCALE, observed};
     pub use crate::engine::cpu::reset::drawn_start;
     pub use crate::engine::cpu::sense::ranges;
     pub use crate::engine::cpu::steer::{commanded, controlled};

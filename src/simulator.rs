@@ -8,6 +8,8 @@ use std::borrow::Cow;
 use std::sync::Arc;
 use std::time::Duration;
 
+use bytemuck::{AnyBitPattern, NoUninit};
+
 use crate::engine::EngineBatch;
 #[cfg(feature = "gpu")]
 use crate::engine::gpu;
@@ -47,6 +49,17 @@ pub struct Begin {
     pub route: Option<u32>,
     /// The episode's start. None: drawn.
     pub start: Option<Start>,
+}
+
+/// The bytes of a column as rows. Those read from a device need not be aligned.
+pub fn rows<T: AnyBitPattern + NoUninit>(bytes: Cow<'_, [u8]>) -> Cow<'_, [T]> {
+    match bytes {
+        Cow::Borrowed(bytes) => match bytemuck::try_cast_slice(bytes) {
+            Ok(rows) => Cow::Borrowed(rows),
+            Err(_) => Cow::Owned(bytemuck::pod_collect_to_vec(bytes)),
+        },
+        Cow::Owned(bytes) => Cow::Owned(bytemuck::pod_collect_to_vec(&bytes)),
+    }
 }
 
 /// A batch of trucks in a world.
@@ -140,8 +153,8 @@ impl Simulator {
         self.batch.tally()
     }
 
-    /// The bytes of some columns, as [`Simulator::batch`] has them, `[n_envs]` rows each. From a device these alone are
-    /// read, unless all were read since the last step.
+    /// The bytes of some columns, as [`Simulator::batch`] has them, `[n_envs]` [`rows`] each. From a device these alone
+    /// are read, unless all were read since the last step.
     pub fn read(&self, columns: &[Column]) -> Result<Vec<Cow<'_, [u8]>>, Error> {
         self.batch.read(columns)
     }

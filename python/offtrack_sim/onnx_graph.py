@@ -189,14 +189,18 @@ def read(file: str) -> Network:
 def _passed(reader: _Reader, node: Any) -> tuple[str, tuple[str, Any] | None]:
     """The input that flows into a node, and what the node is: its kind and numbers, ``None`` where it changes none."""
     kind = node.op_type
+    if kind in SHAPES and _changes_numbers(reader, node):
+        raise TypeError(
+            f"{_named(node)}: it rounds, or moves values among each other; a policy file has no place for it"
+        )
     if kind in SHAPES or kind == "ArgMax" or (kind == "Gather" and _is_one_step(reader.constant(node.input[1]))):
         return node.input[0], None
     if kind in ("Relu", "Tanh"):
         return node.input[0], (kind, None)
-    if kind in ("Add", "Mul", "MatMul"):
+    if kind in ("Add", "Mul"):
         value, constant = reader.operands(node)
         return value, (kind, constant)
-    if kind in ("Sub", "Div"):
+    if kind in ("Sub", "Div", "MatMul"):
         constant = reader.constant(node.input[1])
         if constant is not None:
             return node.input[0], (kind, np.asarray(constant, np.float32))
@@ -212,6 +216,24 @@ def _passed(reader: _Reader, node: Any) -> tuple[str, tuple[str, Any] | None]:
     raise TypeError(
         f"{_named(node)}: a policy file has no place for it; Gemm, MatMul, Add, Relu, Tanh, GRU and LSTM are read"
     )
+
+
+def _changes_numbers(reader: _Reader, node: Any) -> bool:
+    """Whether a node that seems to change no number does: one that rounds values, or turns rows into columns."""
+    if node.op_type == "Cast":
+        before = reader.producers.get(node.input[0])
+        of_actions = before is not None and before.op_type == "ArgMax"
+        types = reader.onnx.TensorProto
+        return not of_actions and reader.attribute(node, "to") not in (
+            types.FLOAT,
+            types.DOUBLE,
+            types.FLOAT16,
+            types.BFLOAT16,
+        )
+    if node.op_type == "Transpose":
+        order = reader.attribute(node, "perm")
+        return order is None or order[-1] != len(order) - 1
+    return False
 
 
 def _is_one_step(index: Any) -> bool:
@@ -233,7 +255,7 @@ def _gemm(reader: _Reader, node: Any) -> Layer:
 
 def _recurrent(reader: _Reader, node: Any) -> tuple[Layer, Layer]:
     gates = node.op_type.lower()
-    parts = [reader.constant(name) for name in node.input[1:4]]
+    parts = [reader.constant(name) for name in node.input[1:4] if name]
     direction = reader.attribute(node, "direction", b"forward")
     others = ("activations", "clip", "input_forget")
     if any(part is None for part in parts) or len(parts) < 2 or direction != b"forward":
@@ -242,6 +264,9 @@ def _recurrent(reader: _Reader, node: Any) -> tuple[Layer, Layer]:
         raise TypeError(f"{_named(node)}: {', '.join(others)} and peepholes have no place in a policy file")
     if gates == "gru" and reader.attribute(node, "linear_before_reset", 0) != 1:
         raise TypeError(f"{_named(node)}: linear_before_reset = 1 is needed, as PyTorch has it")
+    states = [reader.constant(name) for name in node.input[5:7] if name]
+    if any(np.any(state) for state in states if state is not None):
+        raise TypeError(f"{_named(node)}: its first hidden values are not 0, as a policy's are")
     n_units = parts[1].shape[-1]
     order = np.argsort(ORDER[gates])
 
@@ -275,7 +300,7 @@ def _chained(file: str, passed: list[tuple[Any, str, Any]]) -> Network:
             raise misplaced(node)
         if is_begin and kind in ("Sub", "Add") and mean is None and factor is None:
             mean = numbers if kind == "Sub" else -numbers
-        elif is_begin and kind in ("Mul", "Div") and factor is None:
+        elif is_begin and kind in ("Mul", "Div") and factor is None and not is_clipped:
             factor = numbers if kind == "Mul" else 1 / numbers
         elif is_begin and kind == "Clip" and (mean is not None or factor is not None) and numbers == (-CLIP, CLIP):
             is_clipped = True

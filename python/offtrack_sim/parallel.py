@@ -27,7 +27,7 @@ MOST_TRUCKS = 8
 
 
 class RoundaboutParallel(ParallelEnv[str, Observation, Any]):
-    """Two to eight trucks on one road, and its other vehicles; a step is 0.1 s.
+    """Up to eight trucks on one road, and its other vehicles; a step is 0.1 s.
 
     ``"truck_0"``, ``"truck_1"``, ... begin together, on arms of their own or at least in lanes of their own, and see,
     follow and touch each other as they do other vehicles. An agent whose episode has ended leaves ``agents``, and its
@@ -43,7 +43,8 @@ class RoundaboutParallel(ParallelEnv[str, Observation, Any]):
         n_trucks: Number of trucks, in place of the benchmark's ``traffic.group``.
         split: Routes that episodes are drawn from.
         routes: Names of routes or roundabouts in place of a split. Each roundabout needs as many lanes to begin in.
-        render_mode: None, or ``"rgb_array"`` for pictures of ``render_size`` pixels a side, around the first agent.
+        render_mode: None, or ``"rgb_array"`` for pictures around the first agent.
+        render_size: Side of a picture [px].
         device: ``"cpu"``, ``"gpu"`` or part of an adapter's name.
 
     ``reset(seed=s)`` begins the first episode of the streams ``(s, 0)``, ``(s, 1)``, ..., and each later ``reset()``

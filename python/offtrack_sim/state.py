@@ -13,7 +13,7 @@ from .layout import COLUMNS
 
 def check_world(scenario: str, found: npt.ArrayLike, fingerprint: int) -> None:
     """An error where a state is of another world than this one of a benchmark."""
-    if np.asarray(found).tolist() != fingerprint:
+    if np.asarray(found).reshape(-1).tolist() != [fingerprint]:
         raise ValueError(f"scenario: {scenario} has changed since this state was kept, or is another one here")
 
 
@@ -44,5 +44,5 @@ def checked_state(
         raise ValueError(f"stream: {stream.dtype} of shape {stream.shape}; {needed} are needed")
     outside = stream[(stream < 0) | (stream >= 2**32)] if stream.dtype != np.uint32 else stream[:0]
     if outside.size:
-        raise ValueError(f"stream: {outside.flat[0]}; must lie in 0..{2**32}")
+        raise ValueError(f"stream: {outside.flat[0]}; must lie in 0..{2**32 - 1}")
     return columns, [(seed, env) for seed, env in stream.tolist()]

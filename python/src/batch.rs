@@ -19,6 +19,7 @@ use offtrack::simulator::Autoreset;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::arrays::aligned;
 use crate::infos::{End, Infos, Names};
 use crate::observed::{self, Beside, Read};
 use crate::worlds::{Asked, Given, Place};
@@ -256,7 +257,7 @@ impl Batch {
     fn step_at_random(&self, py: Python) -> PyResult<()> {
         guarded(|| {
             let mut state = self.state()?;
-            state.check_process(&self.device)?;
+            state.check_step(py, self)?;
             let State { simulator, pool, .. } = &mut *state;
             pool.run(py, || {
                 simulator.step_at_random();
@@ -371,7 +372,7 @@ impl Batch {
         route: &str,
         points: PyReadonlyArray2<f64>,
     ) -> PyResult<Bound<'py, PyArray1<f32>>> {
-        guarded(|| Ok(geometry::kerb_distances(py, &self.place, self.route("route", route)?, &points)))
+        guarded(|| Ok(geometry::kerb_distances(py, &self.place, self.route("route", route)?, &aligned(points)?)))
     }
 
     /// Lengths and limits of a vehicle by its index.

@@ -16,6 +16,7 @@ use offtrack_policy::Choice;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use crate::arrays::aligned;
 use crate::batch::{Batch, engine_of};
 use crate::errors::guarded;
 use crate::observed::{Beside, Observed};
@@ -185,6 +186,7 @@ pub fn interval_over_routes(
     values: PyReadonlyArray1<f64>,
 ) -> PyResult<Option<(f64, f64)>> {
     guarded(|| {
+        let (routes, values) = (aligned(routes)?, aligned(values)?);
         let episodes = routes.as_array().into_iter().copied().zip(values.as_array().into_iter().copied());
         let cells = Cells::of_routes(episodes);
         Pool::new(0).run(py, || cells.interval())

@@ -3,6 +3,7 @@
 //! Only what must be fast or what needs the simulator is here. Spaces, infos and the classes of Gymnasium are Python.
 
 mod actions; // arrays of actions
+mod arrays; // arrays of numpy as they come
 mod batch; // the class Batch
 mod command; // the command line
 mod errors; // errors of Rust as exceptions of Python

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 
 use bytemuck::{AnyBitPattern, NoUninit};
 use offtrack::layout::{Column, EXTRAS, N_AROUND, N_EXTRAS, N_VALUES};
-use offtrack::simulator::{Autoreset, Batch, Error, Simulator};
+use offtrack::simulator::{Autoreset, Batch, Error, Simulator, rows};
 use offtrack::world::World;
 use rayon::prelude::*;
 
@@ -82,7 +82,7 @@ impl<'a> Read<'a> {
     /// The rows of a column, none where it was not read.
     pub fn rows<T: AnyBitPattern + NoUninit>(&self, column: Column) -> Cow<'_, [T]> {
         let position = self.columns.iter().position(|read| *read == column);
-        position.map_or(Cow::Borrowed(&[]), |position| rows_of(&self.bytes[position]))
+        position.map_or(Cow::Borrowed(&[]), |position| rows(Cow::Borrowed(self.bytes[position].as_ref())))
     }
 
     /// What trucks observe before the next action.
@@ -98,14 +98,6 @@ impl<'a> Read<'a> {
 
     fn observed_in(&self, [values, extras, around]: [Column; 3], beside: Beside) -> Observed<'_> {
         Observed { values: self.rows(values), extras: self.rows(extras), around: self.rows(around), beside }
-    }
-}
-
-/// Bytes as rows. Those read from a device need not be aligned.
-pub fn rows_of<T: AnyBitPattern + NoUninit>(bytes: &[u8]) -> Cow<'_, [T]> {
-    match bytemuck::try_cast_slice(bytes) {
-        Ok(rows) => Cow::Borrowed(rows),
-        Err(_) => Cow::Owned(bytemuck::pod_collect_to_vec(bytes)),
     }
 }
 

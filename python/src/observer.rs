@@ -13,6 +13,7 @@ use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::arrays::aligned;
 use crate::errors::guarded;
 use crate::pool::Pool;
 use crate::worlds::{Asked, Given, Place};
@@ -126,7 +127,7 @@ impl Observer {
         trucks: Option<Vec<usize>>,
         poses: PyReadonlyArray2<f64>,
     ) -> PyResult<Seen<'py>> {
-        guarded(|| self.look(py, trucks.as_deref(), &poses, None))
+        guarded(|| self.look(py, trucks.as_deref(), poses, None))
     }
 
     /// Observes each of these trucks at a pose, `[k, 5]`, with its telemetry, `[k, 8]`.
@@ -137,7 +138,7 @@ impl Observer {
         poses: PyReadonlyArray2<f64>,
         telemetry: PyReadonlyArray2<f32>,
     ) -> PyResult<Seen<'py>> {
-        guarded(|| self.look(py, trucks.as_deref(), &poses, Some(&telemetry)))
+        guarded(|| self.look(py, trucks.as_deref(), poses, Some(telemetry)))
     }
 
     /// Steer angle and target speed that each truck's action asks for, after its last target speed.
@@ -150,6 +151,7 @@ impl Observer {
         guarded(|| {
             let held = self.held()?;
             let actions = actions::of_array(actions, self.n_trucks, &self.place.world)?;
+            let target_speed = aligned(target_speed)?;
             let targets = target_speed.as_array();
             let command = |(truck, observer): (usize, &observer::Observer)| {
                 let asked = match &actions {
@@ -174,6 +176,7 @@ impl Observer {
         target: PyReadonlyArray1<f32>,
     ) -> PyResult<Numbers<'py>> {
         guarded(|| {
+            let (speed, target) = (aligned(speed)?, aligned(target)?);
             let (speed, target) = (speed.as_array(), target.as_array());
             let mut held = self.held()?;
             // All or none of the controllers go on.
@@ -274,9 +277,10 @@ impl Observer {
         &self,
         py: Python<'py>,
         trucks: Option<&[usize]>,
-        poses: &PyReadonlyArray2<f64>,
-        telemetry: Option<&PyReadonlyArray2<f32>>,
+        poses: PyReadonlyArray2<f64>,
+        telemetry: Option<PyReadonlyArray2<f32>>,
     ) -> PyResult<Seen<'py>> {
+        let (poses, telemetry) = (aligned(poses)?, telemetry.map(aligned).transpose()?);
         let poses: Vec<_> = poses.as_array().rows().into_iter().map(pose_of).collect();
         let telemetry: Vec<_> = telemetry
             .map_or_else(Vec::new, |telemetry| telemetry.as_array().rows().into_iter().map(telemetry_of).collect());
@@ -322,12 +326,7 @@ fn of_truck(truck: usize, error: Error) -> PyErr {
 
 /// Index of a route by its name, which stands in this argument.
 fn route_of(place: &Place, argument: &str, name: &str) -> PyResult<u32> {
-    let names = &place.world.route_names;
-    let found = names.iter().position(|known| known == name);
-    found.map(|index| index as u32).ok_or_else(|| {
-        let list = offtrack::files::reader::shortened(&names.join(", "), 600);
-        PyValueError::new_err(format!("{argument}: {name:?}; an observer follows one route a truck, here of {list}"))
-    })
+    place.route(argument, name, "an observer follows one route a truck, here of")
 }
 
 /// Index of the first vehicle of a class in the world.

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, TryLockError};
 use std::time::Duration;
 
 use offtrack::files::cache::{Cache, Loading, Stopped};
-use offtrack::files::reader::Reader;
+use offtrack::files::reader::{Reader, shortened};
 use offtrack::files::shipped::{FILES, Kind};
 use offtrack::layout::Action;
 use offtrack::scenario::{ActionKind, Scenario, Split};
@@ -80,6 +80,16 @@ impl Place {
     /// A number for all that trucks drive by here.
     pub fn fingerprint(&self) -> u32 {
         *self.fingerprint.get_or_init(|| self.world.fingerprint())
+    }
+
+    /// Index of a route by its name, which stands in this argument; `known` says of whom the names in the error are.
+    pub fn route(&self, argument: &str, name: &str, known: &str) -> PyResult<u32> {
+        let names = &self.world.route_names;
+        let found = names.iter().position(|route| route == name);
+        found.map(|index| index as u32).ok_or_else(|| {
+            let list = shortened(&names.join(", "), 600);
+            PyValueError::new_err(format!("{argument}: {name:?}; {known} {list}"))
+        })
     }
 
     /// The place that is asked for: from those that were baked last, or baked now, unless `stop` is set on the way.

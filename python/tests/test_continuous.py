@@ -164,6 +164,29 @@ def test_an_observer_says_what_a_command_asks_for_on_the_map() -> None:
         observer.command(np.array([[0, 0], [1.1, 0]]))
 
 
+def test_fields_of_packed_records_are_read_as_their_numbers(tmp_path: Path) -> None:
+    batch = Batch("laden2026-continuous", 2, seed=1)
+    kept = np.zeros(2, [("command", np.float32, 2), ("speed", np.float32), ("done", bool)])
+    kept["command"], kept["speed"] = [[0.5, 0.25], [-0.75, 1.0]], [5.0, 6.0]
+    state = batch.state()
+    batch.step(kept["command"])
+    after = batch.columns("command")["command"]
+    batch.restore(state)
+    batch.step(kept["command"].copy())
+    assert (after == batch.columns("command")["command"]).all() and after["speed"][1] == 1.0
+    observer = offtrack_sim.Observer("laden2026", ["20m/N-left-4"] * 2, vehicles=[("daf_xf", "laden")] * 2)
+    chosen = np.zeros(2, [("action", np.int16), ("done", bool)])
+    chosen["action"] = [3, 7]
+    packed = observer.command(chosen["action"], kept["speed"])
+    plain = observer.command(np.array([3, 7]), [5.0, 6.0])
+    assert all((found == expected).all() for found, expected in zip(packed, plain))
+    biases = np.zeros(9, [("bias", np.float32), ("used", bool)])
+    biases["bias"] = np.arange(9)
+    export.save(tmp_path / "own.safetensors", [(np.zeros((69, 9), np.float32), biases["bias"])])
+    policy = offtrack_sim.Policy.load(tmp_path / "own.safetensors")
+    assert (policy.logits(np.zeros((1, 69), np.float32)) == np.arange(9)).all()
+
+
 @pytest.mark.parametrize(("scenario", "n_commands"), [("attard2023-continuous", 1), ("laden2026-continuous", 2)])
 def test_a_policy_file_of_commands_is_evaluated_as_the_function_that_it_is(
     scenario: str, n_commands: int, tmp_path: Path

@@ -104,7 +104,7 @@ def test_a_policy_with_a_memory_drives_by_a_driver_alone(tmp_path: Path) -> None
         (lambda: driver.act(np.full((3, 69), np.nan)), ValueError, r"observations\[0, 0\]: NaN"),
         (lambda: driver.act(np.zeros((3, 82))), ValueError, "observations: 82 values each; 69 are needed"),
         (lambda: policy.driver(0), ValueError, "n: 0; must be at least 1"),
-        (lambda: policy.driver(10**13), MemoryError, "num_envs"),
+        (lambda: policy.driver(10**13), MemoryError, "^n: 10000000000000; a batch of so many"),
         (lambda: policy.driver(1.5), TypeError, "n: 1.5; an integer is needed"),  # type: ignore[arg-type]
     ):
         with pytest.raises(error, match=message):

@@ -148,12 +148,16 @@ def test_a_recurrent_graph_over_time_is_read_as_one_of_a_step(tmp_path: Path) ->
         ("GRU", ["x", "w3", "r3"], {"hidden_size": 1}, "linear_before_reset = 1 is needed, as PyTorch has it"),
         ("LSTM", ["x", "w4", "r4"], {"hidden_size": 1, "direction": "reverse"}, "one direction, forward, are needed"),
         ("LSTM", ["x", "w4", "r4"], {"hidden_size": 1}, "its last layer is no Gemm or MatMul"),
+        ("LSTM", ["x", "w4", "r4", "", "", "h"], {"hidden_size": 1}, "its first hidden values are not 0"),
+        ("MatMul", ["w", "x"], {}, "node 'y', MatMul: a policy file has no place for it"),
+        ("Transpose", ["x"], {}, "it rounds, or moves values among each other"),
+        ("Cast", ["x"], {"to": onnx.TensorProto.INT32}, "it rounds, or moves values among each other"),
     ],
 )
 def test_a_node_that_a_policy_file_has_no_place_for_is_refused_by_its_name(
     kind: str, inputs: list[str], more: dict[str, Any], message: str, tmp_path: Path
 ) -> None:
-    constants = {"w": np.ones((69, 9)), "b": np.ones(9)}
+    constants = {"w": np.ones((69, 9)), "b": np.ones(9), "h": np.ones((1, 1, 1))}
     constants |= {f"{part}{n}": np.ones((1, n, 69 if part == "w" else 1)) for n in (3, 4) for part in "wr"}
     file = tmp_path / "other.onnx"
     onnx.save(graph(onnx.helper.make_node(kind, inputs, ["y"], **more), constants=constants), str(file))
@@ -166,6 +170,11 @@ def test_a_graph_that_normalises_without_clipping_and_what_is_no_graph_are_refus
     nodes = node("Div", ["x", "b"], ["a"]), node("MatMul", ["a", "w"], ["y"])
     onnx.save(graph(*nodes, constants={"w": np.ones((69, 9)), "b": np.full(69, 2.0)}), str(file))
     with pytest.raises(TypeError, match="it normalises without a Clip to -10..10"):
+        export.from_onnx(file)
+    clipped = {"w": np.ones((69, 9)), "b": np.full(69, 2.0), "low": np.float32(-10), "high": np.float32(10)}
+    nodes = node("Clip", ["a", "low", "high"], ["c"]), node("Mul", ["c", "b"], ["d"]), node("MatMul", ["d", "w"], ["y"])
+    onnx.save(graph(node("Sub", ["x", "b"], ["a"]), *nodes, constants=clipped), str(file))
+    with pytest.raises(TypeError, match="node 'd', Mul: it stands where a policy file has no place for it"):
         export.from_onnx(file)
     file.write_bytes(b"no graph")
     with pytest.raises(ValueError, match="other.onnx: is no ONNX graph"):

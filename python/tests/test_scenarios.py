@@ -161,6 +161,17 @@ def test_routes_are_drawn_by_their_weights_and_by_others_from_then_on() -> None:
         offtrack_sim.Batch(weights=3)  # type: ignore[arg-type]
 
 
+def test_weights_hold_among_thousands_of_routes_too() -> None:
+    batch = offtrack_sim.Batch("random2026", 20_000, split="validation", seed=5, weights={})
+    names = np.unique(np.array(batch.route_names))
+    assert len(names) > 500
+    heavy = names[: len(names) // 2]
+    batch.weigh({name: 3.0 for name in heavy})
+    batch.begin()
+    share = np.isin(np.array(batch.route_names)[batch.routes()], heavy).mean()
+    assert abs(share - 3 * len(heavy) / (2 * len(heavy) + len(names))) < 0.015
+
+
 def test_roads_kerbs_and_vehicles_are_there_as_arrays_that_fit_each_other() -> None:
     batch = offtrack_sim.Batch("attard2023", 64, seed=3)
     for name in ("16m/N-left-3", "32m/E-left-3"):

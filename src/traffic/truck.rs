@@ -61,7 +61,7 @@ impl Others for Trucks<'_> {
     fn hinder(&self, driver: &mut Driver) {
         // The same car, if this truck were not there.
         let mut without = *driver;
-        for (index, view) in self.views.iter().flatten().enumerate() {
+        for (index, view) in self.views.iter().enumerate().filter_map(|(index, view)| Some((index, view.as_ref()?))) {
             let mind = |driver: &mut Driver| {
                 line::mind(view, driver);
                 corridor::mind(view, driver);

@@ -2,6 +2,7 @@
 
 use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use offtrack::layout::{Column, Ended, N_RAYS, Truck};
+use offtrack::simulator::rows;
 use offtrack_drawing::camera::{Camera, Shown};
 use offtrack_evaluation::recording::Vehicle;
 use pyo3::exceptions::{PyIndexError, PyValueError};
@@ -10,13 +11,12 @@ use pyo3::prelude::*;
 use super::Batch;
 use super::state::State;
 use crate::errors;
-use crate::observed::rows_of;
 
 impl Batch {
     /// RGB pixels, `[size, size, 3]`.
     pub(super) fn drawn<'py>(&self, py: Python<'py>, env: usize, size: u32) -> PyResult<Bound<'py, PyArray3<u8>>> {
         if self.n_envs <= env {
-            return Err(PyIndexError::new_err(format!("env: {env}; the batch has trucks 0..{}", self.n_envs)));
+            return Err(PyIndexError::new_err(format!("env: {env}; the batch has trucks 0..{}", self.n_envs - 1)));
         }
         let mut state = self.state()?;
         state.check_process(&self.device)?;
@@ -28,19 +28,19 @@ impl Batch {
                 camera.insert(made.map_err(|error| PyValueError::new_err(format!("size: {error}")))?)
             }
         };
-        let read = simulator
-            .read(&[Column::Truck, Column::Ranges, Column::Ended])
-            .map_err(|error| errors::of_simulator(&error))?;
-        let truck = rows_of::<Truck>(&read[0])[env];
-        let ranges = rows_of::<[f32; N_RAYS]>(&read[1])[env];
+        let cars = self.place.world.traffic.is_some().then_some(Column::Cars);
+        let columns: Vec<Column> = [Column::Truck, Column::Ranges, Column::Ended].into_iter().chain(cars).collect();
+        let mut read = simulator.read(&columns).map_err(|error| errors::of_simulator(&error))?.into_iter();
+        // As many as were asked for, in their order.
+        let mut next = || read.next().unwrap_or_default();
+        let trucks = rows::<Truck>(next());
+        let truck = trucks[env];
+        let ranges = rows::<[f32; N_RAYS]>(next())[env];
+        let codes = rows::<u32>(next());
         // A truck that goes on in another episode has not ended.
-        let code = if truck.held == 1 { rows_of::<u32>(&read[2])[env] } else { Ended::Running as u32 };
+        let code = if truck.held == 1 { codes[env] } else { Ended::Running as u32 };
         let ended = Ended::from_code(code).unwrap_or(Ended::Running);
-        // A device has no vehicles.
-        let vehicles = match self.place.world.traffic {
-            Some(_) => Vehicle::around(&self.place.world, simulator.batch(), env),
-            None => Vec::new(),
-        };
+        let vehicles = Vehicle::around(&self.place.world, &trucks, &rows(next()), env);
         let shown = Shown { truck: &truck, ranges: &ranges, ended, vehicles: &vehicles };
         let picture = camera.draw(&shown);
         PyArray1::from_slice(py, picture).reshape([size as usize, size as usize, 3])

@@ -54,11 +54,6 @@ impl Batch {
 
     /// Index of a route by its name, which stands in this argument.
     pub(super) fn route(&self, argument: &str, name: &str) -> PyResult<u32> {
-        let names = &self.place.world.route_names;
-        let found = names.iter().position(|known| known == name);
-        found.map(|index| index as u32).ok_or_else(|| {
-            let list = offtrack::files::reader::shortened(&names.join(", "), 600);
-            PyValueError::new_err(format!("{argument}: {name:?}; the batch drives {list}"))
-        })
+        self.place.route(argument, name, "the batch drives")
     }
 }

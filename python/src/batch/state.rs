@@ -1,7 +1,7 @@
 //! What a step of a batch changes, and the step.
 
 use offtrack::layout::{Column, Ended, Truck};
-use offtrack::simulator::{Actions, Autoreset, Simulator, Tally};
+use offtrack::simulator::{Actions, Autoreset, Simulator, Tally, rows};
 use offtrack_drawing::camera::Camera;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -10,7 +10,7 @@ use super::Batch;
 use super::arguments::CPU;
 use crate::errors;
 use crate::infos::{End, Episode};
-use crate::observed::{Observed, Read, rows_of};
+use crate::observed::{Observed, Read};
 use crate::pool::Pool;
 
 /// What a step changes.
@@ -38,17 +38,9 @@ impl State {
         actions: &Actions,
         deliver: impl FnOnce(&Observed, &[f32], &[u32]) -> T + Send,
     ) -> PyResult<T> {
-        self.check_process(&batch.device)?;
+        self.check_step(py, batch)?;
         let State { simulator, pool, ends, episodes, held, .. } = self;
         let group = batch.place.world.group();
-        if batch.autoreset == Autoreset::Disabled
-            && let Some(index) = held.chunks(group).position(|held| held.iter().all(|&held| held))
-        {
-            return Err(errors::reset_needed(
-                py,
-                &format!("truck {}: its episode has ended; begin another before the next step", index * group),
-            ));
-        }
         let stepped = pool.run(py, || {
             simulator.step_any(actions)?;
             let read = Read::of(simulator, &batch.read)?;
@@ -80,6 +72,21 @@ impl State {
         stepped.map_err(|error| errors::of_simulator(&error))
     }
 
+    /// An error where a step cannot be made: in a forked child, or where episodes have ended that the caller begins.
+    pub(super) fn check_step(&self, py: Python, batch: &Batch) -> PyResult<()> {
+        self.check_process(&batch.device)?;
+        let group = batch.place.world.group();
+        if batch.autoreset == Autoreset::Disabled
+            && let Some(index) = self.held.chunks(group).position(|held| held.iter().all(|&held| held))
+        {
+            return Err(errors::reset_needed(
+                py,
+                &format!("truck {}: its episode has ended; begin another before the next step", index * group),
+            ));
+        }
+        Ok(())
+    }
+
     /// Sums over all steps, those of the batch that this one goes on from among them.
     pub(super) fn tally(&self) -> PyResult<Tally> {
         let mut tally = self.simulator.tally().map_err(|error| errors::of_simulator(&error))?;
@@ -90,9 +97,9 @@ impl State {
     /// Looks at where trucks are after they were put there.
     pub(super) fn look(&mut self) -> PyResult<()> {
         let State { simulator, episodes, held, ends, .. } = self;
-        let read = simulator.read(&[Column::Truck]).map_err(|error| errors::of_simulator(&error))?;
+        let mut read = simulator.read(&[Column::Truck]).map_err(|error| errors::of_simulator(&error))?;
         ends.clear();
-        see(&rows_of::<Truck>(&read[0]), episodes, held);
+        see(&rows::<Truck>(read.pop().unwrap_or_default()), episodes, held);
         Ok(())
     }
 

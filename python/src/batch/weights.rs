@@ -30,19 +30,33 @@ pub(super) fn table(place: &Place, weights: &[(String, f64)]) -> PyResult<Vec<u3
     if sum <= 0.0 {
         return Err(PyValueError::new_err("weights: 0 for every route; one must be greater"));
     }
-    // Each route that has a weight stands there once, and where the rest of the entries fall in the sum of the shares.
+    let mut entries = entries(&shares, sum);
+    // A route with a weight too small for an entry has one of those of the route that has most.
+    for route in 0..shares.len() {
+        if entries[route] == 0 && 0.0 < shares[route] {
+            let most = (0..entries.len()).max_by_key(|&other| entries[other]).unwrap_or(route);
+            entries[most] -= 1;
+            entries[route] = 1;
+        }
+    }
     let mut table: Vec<u32> =
-        place.routes.iter().zip(&shares).filter(|(_, share)| 0.0 < **share).map(|(&route, _)| route).collect();
-    let rest = (ENTRIES.max(4 * names.len())) - table.len();
+        place.routes.iter().zip(entries).flat_map(|(&route, n)| std::iter::repeat_n(route, n)).collect();
+    table.sort_unstable();
+    Ok(table)
+}
+
+/// How many entries of a table fall to each share of the sum.
+fn entries(shares: &[f64], sum: f64) -> Vec<usize> {
+    let n = ENTRIES.max(4 * shares.len());
+    let mut entries = vec![0; shares.len()];
     let (mut index, mut reached) = (0, shares[0]);
-    for entry in 0..rest {
-        let place_in_sum = (entry as f64 + 0.5) / rest as f64 * sum;
+    for entry in 0..n {
+        let place_in_sum = (entry as f64 + 0.5) / n as f64 * sum;
         while reached <= place_in_sum && index + 1 < shares.len() {
             index += 1;
             reached += shares[index];
         }
-        table.push(place.routes[index]);
+        entries[index] += 1;
     }
-    table.sort_unstable();
-    Ok(table)
+    entries
 }

@@ -8,7 +8,7 @@ use pyo3::exceptions::{PyMemoryError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
 use super::{Split, chosen, split};
-use crate::errors::{self, guarded};
+use crate::errors::guarded;
 use crate::pool::Pool;
 
 /// A policy at the wheel of several trucks. The class `offtrack_sim.Driver` wraps it and documents it.
@@ -61,7 +61,11 @@ impl Driver {
 impl Driver {
     /// The policy with a memory for each of `n` trucks.
     pub fn of(policy: &Policy, n: usize) -> PyResult<Driver> {
-        offtrack::simulator::check_size(n).map_err(|error| errors::of_simulator(&error))?;
+        if offtrack::simulator::check_size(n).is_err() {
+            let message =
+                format!("n: {n}; a batch of so many trucks does not fit into this machine's memory: take fewer");
+            return Err(PyMemoryError::new_err(message));
+        }
         let n_numbers = n.saturating_mul(policy.n_remembered());
         if Vec::<f32>::new().try_reserve_exact(n_numbers).is_err() {
             let message = format!("n: {n}; {} remembers {} numbers of each: take fewer", policy.name, n_numbers / n);

@@ -6,13 +6,15 @@ use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUnty
 use offtrack::layout::shared::Named;
 use offtrack::layout::{Action, N_AROUND, N_VALUES};
 use offtrack_policy::{
-    Activation, Cell, Frames, Gates, Head, Layer, Normalisation, Padding, Policy, Recurrent, Selection, Squash,
+    Activation, Cell, FILE_LIMIT, Frames, Gates, Head, Layer, Normalisation, Padding, Policy, Recurrent, Selection,
+    Squash,
 };
 use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use super::refused;
+use crate::arrays::aligned;
 use crate::errors::guarded;
 use crate::pool::Pool;
 use crate::worlds::Table;
@@ -79,9 +81,9 @@ impl Given<'_> {
         let n_values = values.as_ref().map_or(N_VALUES + n_beside, |values| values.indices().len());
         let n_stacked = n_values.saturating_mul(self.frames);
         self.check_shapes(n_stacked)?;
-        let pair = |(input, hidden): &(Pair, Pair)| Cell { input: layer(input), hidden: layer(hidden) };
-        let recurrent =
-            gates.map(|gates| Recurrent { gates, after: self.after, cells: self.cells.iter().map(pair).collect() });
+        let pair = |(input, hidden): &(Pair, Pair)| Ok(Cell { input: layer(input)?, hidden: layer(hidden)? });
+        let cells = self.cells.iter().map(pair).collect::<PyResult<_>>()?;
+        let recurrent = gates.map(|gates| Recurrent { gates, after: self.after, cells });
         Ok(Policy {
             name: file.to_owned(),
             benchmark,
@@ -92,7 +94,7 @@ impl Given<'_> {
             vehicles,
             frames: Frames { n: self.frames, padding },
             normalisation: self.normalisation(n_values, n_stacked, extras)?,
-            layers: self.layers.iter().map(layer).collect(),
+            layers: self.layers.iter().map(layer).collect::<PyResult<_>>()?,
             activation,
             recurrent,
         })
@@ -115,7 +117,7 @@ impl Given<'_> {
             let message = format!("variance: shape ({},) beside a mean of shape ({},)", factor.len(), mean.len());
             return Err(PyValueError::new_err(message));
         }
-        Ok(Normalisation { mean: vector(mean), factor: vector(factor) })
+        Ok(Normalisation { mean: vector(mean)?, factor: vector(factor)? })
     }
 
     /// An error for layers whose shapes do not fit each other, before any of them is copied.
@@ -218,12 +220,13 @@ fn ends(actions: &[Action]) -> Vec<Action> {
     vec![end(f32::INFINITY, f32::min), end(f32::NEG_INFINITY, f32::max)]
 }
 
-fn layer((weights, biases): &Pair) -> Layer {
-    Layer { weights: weights.as_array().iter().copied().collect(), biases: vector(biases) }
+fn layer((weights, biases): &Pair) -> PyResult<Layer> {
+    let weights = aligned(weights.clone())?.as_array().iter().copied().collect();
+    Ok(Layer { weights, biases: vector(biases)? })
 }
 
-fn vector(array: &PyReadonlyArray1<f32>) -> Vec<f32> {
-    array.as_array().to_vec()
+fn vector(array: &PyReadonlyArray1<f32>) -> PyResult<Vec<f32>> {
+    Ok(aligned(array.clone())?.as_array().to_vec())
 }
 
 /// One of a list of names.
@@ -235,7 +238,7 @@ fn word<T: Named>(key: &str, word: &str) -> PyResult<T> {
 }
 
 /// Most weights and biases: those of the largest file that is read.
-const MOST_NUMBERS: usize = (64 << 20) / size_of::<f32>();
+const MOST_NUMBERS: usize = FILE_LIMIT as usize / size_of::<f32>();
 
 /// Writes a file, whole or not at all.
 fn write(file: &str, bytes: &[u8]) -> PyResult<()> {
