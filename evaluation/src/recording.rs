@@ -180,7 +180,8 @@ impl Recorder {
     pub fn new(world: &World, batch: &Batch, envs: impl IntoIterator<Item = usize>) -> Recorder {
         let track = |env: usize| {
             let (vehicle, start) = (batch.truck[env].vehicle, Frame::at_start(world, batch, env));
-            let vehicles = world.traffic.iter().map(|_| Vehicle::around(world, batch, env)).collect();
+            let vehicles =
+                world.traffic.iter().map(|_| Vehicle::around(world, &batch.truck, &batch.cars, env)).collect();
             Track { env, vehicle, ended: Ended::Running, frames: vec![start], vehicles }
         };
         Recorder { tracks: envs.into_iter().map(track).collect() }
@@ -190,7 +191,9 @@ impl Recorder {
     pub fn follow(&mut self, world: &World, batch: &Batch) {
         for track in self.tracks.iter_mut().filter(|track| track.ended == Ended::Running) {
             track.frames.push(Frame::after_step(world, batch, track.env));
-            track.vehicles.extend(world.traffic.iter().map(|_| Vehicle::around(world, batch, track.env)));
+            track
+                .vehicles
+                .extend(world.traffic.iter().map(|_| Vehicle::around(world, &batch.truck, &batch.cars, track.env)));
             track.ended = Ended::from_code(batch.ended[track.env]).unwrap_or(Ended::Running);
         }
     }

@@ -2,9 +2,8 @@
 
 use std::borrow::Cow;
 
-use bytemuck::{AnyBitPattern, NoUninit};
 use offtrack::layout::{Clearance, Column, Command, Control, N_CAR_WORDS, Progress, RewardTerms, Truck};
-use offtrack::simulator::{Error, Simulator};
+use offtrack::simulator::{Error, Simulator, rows};
 
 const COLUMNS: [Column; 9] = [
     Column::Action,
@@ -60,15 +59,4 @@ impl<'a> Seen<'a> {
 /// The codes of how the last step ended each truck's episode.
 pub(crate) fn ended(simulator: &Simulator) -> Result<Cow<'_, [u32]>, Error> {
     Ok(rows(simulator.read(&[Column::Ended])?.pop().unwrap_or_default()))
-}
-
-/// Bytes as rows. Those read from a device need not be aligned.
-fn rows<T: AnyBitPattern + NoUninit>(bytes: Cow<'_, [u8]>) -> Cow<'_, [T]> {
-    match bytes {
-        Cow::Borrowed(bytes) => match bytemuck::try_cast_slice(bytes) {
-            Ok(rows) => Cow::Borrowed(rows),
-            Err(_) => Cow::Owned(bytemuck::pod_collect_to_vec(bytes)),
-        },
-        Cow::Owned(bytes) => Cow::Owned(bytemuck::pod_collect_to_vec(&bytes)),
-    }
 }

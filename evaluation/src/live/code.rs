@@ -14,7 +14,7 @@ use offtrack::layout::{
 use offtrack::simulator::Tally;
 use offtrack::traffic::{Car, N_TURNS, Row};
 use offtrack_policy::kernel::{self as act, SHAPES, Shape};
-use offtrack_policy::{Activation, KEY, LIMIT, MOST_LAYERS, SAME_ACTION, VERSIONS};
+use offtrack_policy::{Activation, FILE_LIMIT, KEY, LIMIT, MOST_LAYERS, SAME_ACTION, VERSIONS};
 use serde_json::{Map, Value, json};
 
 use super::journal;
@@ -103,8 +103,6 @@ fn buffers() -> Value {
 
 /// Whether a policy reads what other vehicles do, in the order of what is printed for both.
 const READS_VEHICLES: [bool; 2] = [false, true];
-/// Most bytes of a policy file that is dropped on the page.
-const FILE_LIMIT: usize = 64 << 20;
 
 /// A text in parts, of which some are known ones, in this order.
 fn parts<'a>(text: &'a str, known: &[&'a str]) -> Vec<&'a str> {

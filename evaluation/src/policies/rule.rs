@@ -4,7 +4,7 @@
 //! its line until what has entered leaves it a gap: that is what a learner must beat.
 
 use offtrack::layout::{Action, N_VALUES};
-use offtrack::physics::seen_by_vehicles;
+use offtrack::physics::{SPEED_SCALE, seen_by_vehicles};
 use offtrack::simulator::{Actions, Batch};
 use offtrack::traffic::car::Outline;
 use offtrack::traffic::units::{length, metres, metres_per_second};
@@ -23,9 +23,8 @@ pub const YIELDS: &str = "yields";
 pub const FOLLOWS: &str = "follows";
 /// The policy that steers: the one for an empty road at one speed.
 const STEERS: &str = "attard2023";
-/// The speed that it is shown, and the speed that is observed as 1 (m/s).
+/// The speed that it is shown (m/s).
 const SHOWN: f32 = 30.0 / 3.6;
-const SPEED_SCALE: f32 = 27.8;
 /// Time that is left to what comes (s).
 const LAG: f32 = 4.0;
 /// A truck swings out as it enters: it stops so far before the line of cars (m).

@@ -1,8 +1,7 @@
 //! The other vehicles of a recording.
 
 use glam::Vec2;
-use offtrack::layout::{MOST_IN_GROUP, N_CARS};
-use offtrack::simulator::Batch;
+use offtrack::layout::{MOST_IN_GROUP, N_CAR_WORDS, N_CARS, Truck};
 use offtrack::traffic::car::Outline;
 use offtrack::traffic::{Row, outlines};
 use offtrack::world::World;
@@ -41,10 +40,11 @@ pub struct Vehicle {
 }
 
 impl Vehicle {
-    /// Those around a truck of a batch on the CPU, as the road is driven; none in a world without.
-    pub fn around(world: &World, batch: &Batch, env: usize) -> Vec<Vehicle> {
-        let (Some(shared), Some(words)) = (&world.traffic, batch.cars.get(env)) else { return Vec::new() };
-        let network = &shared.road(world, batch.truck[env].route).network;
+    /// Those around a truck of a batch with these rows of its columns `truck` and `cars`, as the road is driven; none
+    /// in a world without.
+    pub fn around(world: &World, trucks: &[Truck], cars: &[[u32; N_CAR_WORDS]], env: usize) -> Vec<Vehicle> {
+        let (Some(shared), Some(words)) = (&world.traffic, cars.get(env)) else { return Vec::new() };
+        let network = &shared.road(world, trucks[env].route).network;
         let there = Row::of(words).cars.iter().enumerate().filter(|(_, car)| car.is_there());
         let vehicles = |(slot, car): (usize, &offtrack::traffic::Car)| {
             let (state, is_rude) = ([car.speed(), car.acceleration()], car.is_rude());
@@ -52,10 +52,10 @@ impl Vehicle {
             units.map(move |(outline, slot)| Vehicle { is_rude, ..Vehicle::of(slot, outline, state) })
         };
         // Behind the slots of cars stand the other trucks of a group, two units each.
-        let first = env - env % batch.group();
-        let mates = (first..first + batch.group()).filter(|&mate| mate != env && batch.truck[mate].held == 0);
+        let first = env - env % world.group();
+        let mates = (first..first + world.group()).filter(|&mate| mate != env && trucks[mate].held == 0);
         let units = mates.flat_map(|mate| {
-            let truck = &batch.truck[mate];
+            let truck = &trucks[mate];
             let slot = N_CARS + 2 * (mate - first);
             let of = move |(unit, outline)| Vehicle::of(slot + unit, outline, [truck.speed, truck.acceleration]);
             outlines(world.rig(truck), truck).into_iter().enumerate().map(of)

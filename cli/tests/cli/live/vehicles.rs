@@ -113,7 +113,7 @@ fn vehicles_have_the_colours_of_their_kind_lit_brakes_and_an_edge_where_drivers_
         [tractor, trailer].iter().all(|unit| APART < unit.distance(vehicle.position.into()))
     };
     let around = |env: usize| -> Vec<Vehicle> {
-        let all = Vehicle::around(&ground.world, batch, env);
+        let all = Vehicle::around(&ground.world, &batch.truck, &batch.cars, env);
         all.into_iter()
             .filter(|vehicle| is_apart(vehicle, env) && vehicle.position.iter().all(|at| at.abs() < 40.0))
             .collect()
@@ -175,7 +175,8 @@ fn buses_and_trucks_with_trailers_are_drawn_where_both_units_are() {
     let mut simulator = simulator(&ground.world);
     (0..20).for_each(|_| simulator.step_at_random());
     let around = |env: usize| -> Vec<Vehicle> {
-        let all = Vehicle::around(&ground.world, simulator.batch(), env).into_iter();
+        let batch = simulator.batch();
+        let all = Vehicle::around(&ground.world, &batch.truck, &batch.cars, env).into_iter();
         all.filter(|vehicle| vehicle.is_large() && vehicle.position.iter().all(|at| at.abs() < 40.0)).collect()
     };
     let env = (0..N_SEEN).max_by_key(|&env| around(env).len()).unwrap();
