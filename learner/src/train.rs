@@ -252,16 +252,21 @@ impl Training {
         outcome.evaluation = evaluated.as_ref().map(|(report, _)| report.clone());
         let further = self.worlds.also.iter().map(|also| also.evaluate(&policy, rule, caller));
         outcome.also = further.collect::<Result<_, _>>()?;
+        let mut page = Ok(());
         if let Some((report, tracks)) = evaluated {
-            let metrics = Some(read_text(&folder.metrics(), METRICS_LIMIT)?);
+            let metrics = read_text(&folder.metrics(), METRICS_LIMIT)
+                .map_err(|error| caller.tell(Event::Warning(&format!("{error}; the page has no curves"))))
+                .ok();
             let (scenario, world) = (&self.worlds.benchmark, &self.worlds.benchmark_world);
-            Page { scenario, world, evaluation: &report, tracks: &tracks, run: json!(outcome), metrics }
-                .write(&folder.page())?;
+            page = Page { scenario, world, evaluation: &report, tracks: &tracks, run: json!(outcome), metrics }
+                .write(&folder.page());
         }
         // Last of all: a run that has it is finished.
         files::write_json(&folder.report(), &outcome)?;
         caller.tell(Event::Finished { folder, outcome: &outcome });
         // The evaluation is not lost where something else could not be written.
-        written.map(|()| outcome)
+        written?;
+        page?;
+        Ok(outcome)
     }
 }

@@ -10,6 +10,7 @@ mod summary;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use offtrack_commands::signals::on_signals;
 use offtrack_evaluation::files;
@@ -21,6 +22,9 @@ use offtrack_learner::train::{Caller, Event, Training};
 
 pub use args::Args;
 use display::Display;
+
+/// Signals within this time of the first are one.
+const TOGETHER: Duration = Duration::from_millis(500);
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
@@ -125,10 +129,16 @@ fn check_settings(args: &Args) -> Result<(), Error> {
 /// second ends the process.
 fn stop_on_signals(display: &Display) {
     let mut stop = Some(display.stopper());
+    let mut stopped = Instant::now();
     // Without it a signal ends the process at once; the last policy and checkpoint are whole all the same.
     on_signals(move || match stop.take() {
         // On a thread of its own: a line may wait for its reader, and a second signal must not.
-        Some(stop) => drop(std::thread::Builder::new().spawn(stop)),
+        Some(stop) => {
+            stopped = Instant::now();
+            drop(std::thread::Builder::new().spawn(stop));
+        }
+        // The same one again: `timeout` sends it to the process and to its group.
+        None if stopped.elapsed() < TOGETHER => {}
         None => {
             files::remove_temporaries();
             std::process::exit(130);

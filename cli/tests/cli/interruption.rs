@@ -60,6 +60,19 @@ fn a_stopped_run_leaves_a_policy_and_says_that_it_was_interrupted() {
     }
 }
 
+#[test]
+fn two_signals_at_once_are_one_as_timeout_sends_them_to_a_process_and_to_its_group() {
+    let place = Place::new();
+    for signal in ["-TERM", "-INT"] {
+        let run = begun(&place, endless(&place));
+        send(&run, signal);
+        std::thread::sleep(Duration::from_millis(20));
+        succeed(&ended(run, signal));
+        assert_eq!(place.json("runs/run/report.json")["interrupted"], true);
+        std::fs::remove_dir_all(place.file("runs")).unwrap();
+    }
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn a_run_goes_on_when_its_terminal_closes_where_nohup_began_it() {

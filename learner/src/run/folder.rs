@@ -119,7 +119,7 @@ impl Folder {
 
 /// Makes `runs/name`, or `runs/<training file's name>` with the first free number.
 pub fn make(runs: &Path, name: Option<&str>, config_file: &Path) -> Result<PathBuf, Error> {
-    std::fs::create_dir_all(runs).map_err(Error::write(runs))?;
+    files::make_folder(runs)?;
     match name {
         Some(name) => named(runs, name),
         None => numbered(runs, config_file),

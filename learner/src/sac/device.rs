@@ -215,7 +215,7 @@ impl DeviceSac {
         if target.is_some() {
             self.n_steps[2] = self.n_steps[2].saturating_add(1);
         }
-        let [first, second] = super::entropy::DECAY.map(|decay| 1.0 - decay.powi(self.n_steps[2]));
+        let [first, second] = crate::adam::DECAY.map(|decay| 1.0 - decay.powi(self.n_steps[2]));
         Now {
             rates: Vec2::new(actor.learning_rate, critics.learning_rate),
             epsilons: Vec2::new(actor.epsilon, critics.epsilon),

@@ -1,9 +1,8 @@
 //! The entropy coefficient: fixed, or adapted until the policy has the entropy asked for.
 
+use crate::adam::DECAY;
 use crate::config::Entropy;
 
-/// Adam's decay rates of the first and the second moment.
-pub(super) const DECAY: [f32; 2] = [0.9, 0.999];
 /// Keeps Adam from dividing by 0.
 pub(super) const EPSILON: f32 = 1e-8;
 

@@ -29,7 +29,8 @@ pub struct Outcome {
     pub training_success: Option<f64>,
     /// Number of the latest training episodes; each row of the metrics is a mean over as many.
     pub training_window: u64,
-    /// The training routes with least success; none where the trucks were on a device.
+    /// The training routes with least success; none where they were not counted: on a device they
+    /// are with level replay alone.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub training_routes: Option<WorstRoutes>,
     /// How the policy did on validation routes, and which one was kept; none without validation.
