@@ -72,16 +72,14 @@ pub fn run(args: &Args) -> Result<bool, Error> {
     }
     let all_hold = rows.iter().all(|row| row.differs.is_empty());
     let board = Board::new(rows);
-    if let Some(file) = &args.json {
-        files::write_json(file, &board)?;
-    }
-    if let Some(file) = &args.csv {
-        files::write_whole(file, board.csv().as_bytes())?;
-    }
-    if let Some(file) = &args.markdown {
-        files::write_whole(file, board.markdown().as_bytes())?;
-    }
-    files::print(&board.markdown())?;
+    // Each of them, whether or not another could be written.
+    let done = [
+        files::print(&board.markdown()),
+        args.json.as_deref().map_or(Ok(()), |file| files::write_json(file, &board)),
+        args.csv.as_deref().map_or(Ok(()), |file| files::write_whole(file, board.csv().as_bytes())),
+        args.markdown.as_deref().map_or(Ok(()), |file| files::write_whole(file, board.markdown().as_bytes())),
+    ];
+    done.into_iter().collect::<Result<(), Error>>()?;
     Ok(all_hold || !args.check)
 }
 

@@ -67,22 +67,19 @@ pub fn run(args: &Args) -> Result<(), Error> {
         return Err(Error::Setting { name: "--policy", value: args.policy.join(" "), expected });
     }
     let comparison = Comparison::of(&sides);
-    if let Some(file) = &args.json {
-        files::write_json(file, &comparison)?;
-    }
-    for (file, text) in [
-        (&args.csv, Comparison::csv as fn(&Comparison) -> String),
-        (&args.markdown, Comparison::markdown),
-        (&args.latex, Comparison::latex),
-    ] {
-        if let Some(file) = file {
-            files::write_whole(file, text(&comparison).as_bytes())?;
-        }
-    }
-    if let Some(file) = &args.html {
-        write_page(file, &sides, &comparison, &args.policy)?;
-    }
-    files::print(&comparison.text())
+    let written = |file: &Option<PathBuf>, text: fn(&Comparison) -> String| {
+        file.as_deref().map_or(Ok(()), |file| files::write_whole(file, text(&comparison).as_bytes()))
+    };
+    // Each of them, whether or not another could be written.
+    let done = [
+        files::print(&comparison.text()),
+        args.json.as_deref().map_or(Ok(()), |file| files::write_json(file, &comparison)),
+        written(&args.csv, Comparison::csv),
+        written(&args.markdown, Comparison::markdown),
+        written(&args.latex, Comparison::latex),
+        args.html.as_deref().map_or(Ok(()), |file| write_page(file, &sides, &comparison, &args.policy)),
+    ];
+    done.into_iter().collect()
 }
 
 /// Drives the pairs again that one side alone completes, in the first file of each side, and writes the page.

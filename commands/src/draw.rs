@@ -67,7 +67,7 @@ pub struct Args {
     #[arg(long, default_value = "empty", requires = "route")]
     load: String,
     /// With --route: speed at which the front axle follows the lane's centre (km/h).
-    #[arg(long, default_value_t = 30.0, requires = "route", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 30.0, requires = "route")]
     speed_kmh: f64,
     /// Whether gutters may be driven on.
     #[arg(
@@ -77,10 +77,10 @@ pub struct Args {
     )]
     gutter: Gutter,
     /// Length of the routes before the ring (m).
-    #[arg(long, default_value_t = APPROACH, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = APPROACH)]
     approach: f64,
     /// Length of the routes after the ring (m).
-    #[arg(long, default_value_t = DEPARTURE, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = DEPARTURE)]
     departure: f64,
     /// Width of a PNG (pixels) [default: 1000].
     #[arg(long)]

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use offtrack::files::reader;
+use offtrack::files::reader::{self, shown_path};
 use offtrack::scenario::Split;
 use offtrack_evaluation::actions;
 use offtrack_evaluation::avoidable::{self, contacts};
@@ -70,7 +70,8 @@ pub struct Args {
     /// A certificate of `offtrack certify`: success over the routes that it shows to be possible is reported too.
     #[arg(long)]
     certified: Option<PathBuf>,
-    /// Write films to this folder, of one episode of each of the five commonest causes of failure.
+    /// Write films to this folder, which must have none yet, of one episode of each of the five commonest causes of
+    /// failure.
     #[arg(long)]
     films: Option<PathBuf>,
     /// Search for actions that complete the own start of each episode that did not arrive, and report success over the
@@ -141,6 +142,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
         &[("--json", args.json.as_deref()), ("--actions", args.actions.as_deref()), ("--html", args.html.as_deref())],
         &[&args.policy.files()[..], &read[..]].concat(),
     )?;
+    args.films.as_deref().map(check_no_films).transpose()?;
     let device = args.device.open()?;
     let split = Split::ALL.into_iter().find(|split| split.name() == args.split).unwrap_or(Split::Test);
     let asked = args.policy.asked(&args.benchmark, args.load.as_deref(), &args.route);
@@ -193,30 +195,29 @@ pub fn run(args: &Args) -> Result<(), Error> {
             chunks.filter(|(route, _)| possible.contains(route)).flat_map(|(_, chunk)| chunk).collect();
         Summary::of(kept.into_iter(), scenario.step)
     });
-    if let Some(file) = &args.json {
-        let (machine, commit) = (provenance::machine(), provenance::commit());
-        let written = Written { report: &report, machine, device: &device.name, commit, asked: &asked };
-        written.write(file, &evaluation.outcomes(&finished))?;
-    }
-    if let Some(file) = &args.actions {
-        sequences.write(file, &world)?;
-    }
-    if let Some(file) = &args.html {
-        Page { scenario: &scenario, world: &world, evaluation: &report, tracks: &tracks, run, metrics }.write(file)?;
-    }
-    if let Some(folder) = &args.films {
-        write_films(folder, &evaluation, &report, &sequences)?;
-    }
-    files::print(&printed(&report, episodes))
+    // Each of them, whether or not another could be written.
+    let done = [
+        files::print(&printed(&report, episodes)),
+        args.json.as_deref().map_or(Ok(()), |file| {
+            let (machine, commit) = (provenance::machine(), provenance::commit());
+            let written = Written { report: &report, machine, device: &device.name, commit, asked: &asked };
+            written.write(file, &evaluation.outcomes(&finished))
+        }),
+        args.actions.as_deref().map_or(Ok(()), |file| sequences.write(file, &world)),
+        args.html.as_deref().map_or(Ok(()), |file| {
+            Page { scenario: &scenario, world: &world, evaluation: &report, tracks: &tracks, run, metrics }.write(file)
+        }),
+        args.films.as_deref().map_or(Ok(()), |folder| write_films(folder, &evaluation, &report, &sequences)),
+    ];
+    done.into_iter().collect()
 }
 
 /// Films an example of each of the commonest causes of failure: `1-trailer-on-the-island.gif` and the like.
 fn write_films(folder: &Path, evaluation: &Evaluation, report: &Report, sequences: &Sequences) -> Result<(), Error> {
-    std::fs::create_dir_all(folder).map_err(Error::write(folder))?;
+    files::make_folder(folder)?;
     let causes = &report.failures[..report.failures.len().min(FILMS)];
     let indices: Vec<usize> = causes.iter().map(|cause| cause.example.index).collect();
     let &Evaluation { scenario, world, seed, .. } = evaluation;
-    remove_films(folder)?;
     for (n, (cause, track)) in causes.iter().zip(evaluation.repeated(sequences, &indices)?).enumerate() {
         let Example { route: name, episode, .. } = &cause.example;
         let (place, route) =
@@ -229,13 +230,17 @@ fn write_films(folder: &Path, evaluation: &Evaluation, report: &Report, sequence
     Ok(())
 }
 
-/// Removes the films of an evaluation before, which would stand among the new ones.
-fn remove_films(folder: &Path) -> Result<(), Error> {
-    let is_film = |name: &str| (1..=FILMS).any(|n| name.starts_with(&format!("{n}-"))) && name.ends_with(".gif");
+/// An error for a folder with films, such as those of another evaluation: they would stand among the new ones.
+fn check_no_films(folder: &Path) -> Result<(), Error> {
+    files::check_folder(folder)?;
+    if !folder.exists() {
+        return Ok(());
+    }
     for entry in std::fs::read_dir(folder).map_err(Error::read(folder))? {
         let file = entry.map_err(Error::read(folder))?.path();
-        if file.file_name().is_some_and(|name| is_film(&name.to_string_lossy())) {
-            std::fs::remove_file(&file).map_err(Error::write(&file))?;
+        if file.extension().is_some_and(|extension| extension == "gif") {
+            let expected = format!("{} is in it: name another folder, or remove its films", shown_path(&file));
+            return Err(Error::Setting { name: "--films", value: shown_path(folder), expected });
         }
     }
     Ok(())

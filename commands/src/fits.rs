@@ -46,10 +46,10 @@ pub struct Args {
     #[arg(long, default_value = "empty")]
     load: String,
     /// Speed of the vehicle, from its start on (km/h).
-    #[arg(long, default_value_t = 15.0, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 15.0)]
     speed_kmh: f64,
     /// Distance that tractor and trailer must keep from every kerb (m).
-    #[arg(long, default_value_t = 0.0, value_name = "M", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.0, value_name = "M")]
     clearance: f64,
     /// Only this route of each road, N-left-3, or of one, 16m/N-left-3; repeatable. All without it.
     #[arg(long)]
@@ -109,7 +109,7 @@ pub fn run(args: &Args) -> Result<bool, Error> {
     let mut results = Results::new(asked.clone(), humantime::format_rfc3339_seconds(SystemTime::now()).to_string());
     roads.iter().for_each(|road| results.add_road(road));
     vehicles.iter().for_each(|(name, vehicle)| results.add_vehicle(name, vehicle));
-    std::fs::create_dir_all(&args.output).map_err(Error::write(&args.output))?;
+    files::make_folder(&args.output)?;
     let file = args.output.join("fits.json");
     check_files(args, &file, &roads, &vehicles)?;
     results.continue_from(&file)?;

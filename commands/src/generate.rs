@@ -1,7 +1,6 @@
 //! Draws random roundabouts and writes them as ordinary files, with a contact sheet; or plots their distribution.
 
 use std::fmt::Write;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use offtrack::files::reader::{read_bytes, shown_path};
@@ -110,7 +109,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
         if !args.overwrite {
             files().try_for_each(|(file, bytes)| free(&file, &bytes))?;
         }
-        fs::create_dir_all(folder).map_err(Error::write(folder))?;
+        files::make_folder(folder)?;
         files().try_for_each(|(file, bytes)| files::write_whole(&file, &bytes))?;
     }
     if let (Some(file), Some(bytes)) = (&args.plot, &plot) {

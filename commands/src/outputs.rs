@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use offtrack::files::reader::{TEXT_LIMIT, read_text};
+use offtrack::files::reader::{TEXT_LIMIT, read_text, shown_path};
 use offtrack_evaluation::error::Error;
 use toml::Value;
 
@@ -27,8 +27,8 @@ pub fn of_run(folder: &Path) -> [PathBuf; 7] {
 const DEPTH: usize = 3;
 
 /// An error if two of the files to be written are one, or one of them is a file that is read, or one that such a file
-/// names: a vehicle of a benchmark, which the second would replace; or if one is in a folder that there is not, so that
-/// what was computed for it would be lost.
+/// names: a vehicle of a benchmark, which the second would replace; or if one is a folder or in one that there is not, so
+/// that what was computed for it would be lost.
 pub fn distinct(written: &[Named], read: &[Named]) -> Result<(), Error> {
     let mut named = Vec::new();
     for (flag, file) in read {
@@ -46,8 +46,14 @@ pub fn distinct(written: &[Named], read: &[Named]) -> Result<(), Error> {
             let expected = format!("{found}: name another one");
             return Err(Error::Setting { name: flag, value: file.display().to_string(), expected });
         }
-        if let Some(folder) = file.parent().filter(|folder| !folder.as_os_str().is_empty()) {
-            std::fs::metadata(folder).map_err(Error::write(file))?;
+        if file.is_dir() {
+            let expected = "is a folder; a file is needed".to_owned();
+            return Err(Error::Setting { name: flag, value: shown_path(file), expected });
+        }
+        if let Some(folder) = file.parent().filter(|folder| !folder.as_os_str().is_empty())
+            && !std::fs::metadata(folder).map_err(Error::write(file))?.is_dir()
+        {
+            return Err(Error::write(file)(std::io::ErrorKind::NotADirectory.into()));
         }
     }
     Ok(())

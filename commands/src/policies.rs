@@ -37,7 +37,7 @@ pub struct Choice {
     #[arg(long)]
     policy: Option<String>,
     /// With `pursuit`: look-ahead distance (m) [default: 7].
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long)]
     look_ahead: Option<f64>,
     /// With `pursuit`: a certificate of `offtrack certify`, whose paths it follows in place of the lane's centre.
     #[arg(long)]

@@ -135,10 +135,10 @@ pub fn exit_code<E: Display>(done: Result<bool, E>, is_wrong_input: fn(&E) -> bo
 ///
 /// The exit code where that fails or help was asked for: it, or what is wrong, has been printed.
 pub fn parsed<P: Parser>(arguments: &[OsString]) -> Result<P, u8> {
-    P::try_parse_from(arguments).map_err(|error| {
+    read::<P, OsString>(arguments.iter().cloned()).map_err(|error| {
         // Errors repeat arguments: this one is that of the same command with arguments that do nothing to a terminal.
         let shown = arguments.iter().map(|argument| shortened(&argument.to_string_lossy(), LONGEST_ARGUMENT));
-        let Err(shown) = P::try_parse_from(shown) else {
+        let Err(shown) = read::<P, String>(shown) else {
             // One is not Unicode.
             files::say(&error.kind().to_string());
             return WRONG_INPUT;
@@ -147,6 +147,14 @@ pub fn parsed<P: Parser>(arguments: &[OsString]) -> Result<P, u8> {
         let _ = shown.print();
         shown.exit_code() as u8
     })
+}
+
+/// The command of a line of arguments. What looks like a negative number is an option's value, so that an error names
+/// the option.
+fn read<P: Parser, A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>) -> Result<P, clap::Error> {
+    let mut command = P::command().mut_subcommands(|command| command.mut_args(|arg| arg.allow_negative_numbers(true)));
+    let mut matches = command.try_get_matches_from_mut(arguments)?;
+    P::from_arg_matches_mut(&mut matches).map_err(|error| error.format(&mut command))
 }
 
 /// Has Ctrl-C, SIGTERM and SIGHUP end the process with nothing half-written left.

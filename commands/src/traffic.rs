@@ -37,20 +37,20 @@ pub struct Args {
     place: PlaceArgs,
     /// Cars an hour: of the whole road, 1500, spread over all entry lanes and exits alike but for U-turns, of which
     /// there are a tenth; or of arms and from arm to arm, N=400,E-W=120, and no others.
-    #[arg(long, default_value = "1500", allow_negative_numbers = true)]
+    #[arg(long, default_value = "1500")]
     demand: String,
     /// Fraction of the cars that are of a kind: vans=0.25, 7 m long; buses=0.02, rigid_trucks=0.05 and
     /// tractor_trailers=0.03; rude=0.1, whose drivers let nobody in; repeatable.
     #[arg(long, value_name = "KIND=FRACTION")]
     share: Vec<String>,
     /// Time that is counted of each run, after two minutes in which the road fills (min).
-    #[arg(long, default_value_t = 60, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 60)]
     minutes: u32,
     /// Number of runs.
-    #[arg(long, default_value_t = 8, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 8)]
     runs: u32,
     /// Seed of the runs.
-    #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0)]
     seed: u32,
     /// Measure capacities instead: what enters from a queue without end, arm by arm, beside flows of 0 to 1,200 cars an
     /// hour that the other arms feed.

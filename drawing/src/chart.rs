@@ -25,9 +25,11 @@ const AXIS: f64 = 62.0;
 /// Margin to the right of the last plot and below the longest legend (px).
 const MARGIN: f64 = 24.0;
 
-/// Colours for lines that colour-blind readers can distinguish: P. Tol's "muted" scheme and one more.
-pub const LINES: [&str; 10] =
-    ["#332288", "#cc6677", "#117733", "#88ccee", "#882255", "#ddaa33", "#44aa99", "#999933", "#aa4499", "#661100"];
+/// Colours for lines that colour-blind readers can distinguish: P. Tol's "muted" scheme and two more.
+pub const LINES: [&str; 11] = [
+    "#332288", "#cc6677", "#117733", "#88ccee", "#882255", "#ddaa33", "#44aa99", "#999933", "#aa4499", "#661100",
+    "#777777",
+];
 
 /// A picture of panels.
 pub struct Chart {

@@ -19,7 +19,7 @@ pub struct ClassReport {
     pub vehicle: String,
     /// Name of the load.
     pub load: String,
-    /// Episodes run, and those that arrived.
+    /// Episodes run.
     pub episodes: usize,
     /// Episodes that arrived.
     pub arrived: usize,

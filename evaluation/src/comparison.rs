@@ -109,6 +109,10 @@ pub struct SideFigures {
     pub episodes: usize,
     /// Those that arrived.
     pub arrived: usize,
+    /// Lower end of Wilson's 95 % interval of success, over episodes.
+    pub success_low: f64,
+    /// Upper end of it.
+    pub success_high: f64,
     /// Lowest success of a file.
     pub worst: f64,
     /// Success of all episodes, and the other figures of those that arrived.
@@ -227,12 +231,16 @@ fn alone(side: &Side) -> SideFigures {
         Estimate::of(&cells)
     });
     let arrived = |file: &Vec<bool>| file.iter().filter(|&&arrived| arrived).count();
+    let (episodes, n_arrived) = (side.arrived.iter().map(Vec::len).sum(), side.arrived.iter().map(arrived).sum());
+    let (success_low, success_high) = wilson(n_arrived, episodes);
     SideFigures {
         name: side.name.clone(),
         files: side.files.iter().map(|(path, _)| path.display().to_string()).collect(),
         policies: side.files.iter().map(|(_, evaluated)| evaluated.policy.clone()).collect(),
-        episodes: side.arrived.iter().map(Vec::len).sum(),
-        arrived: side.arrived.iter().map(arrived).sum(),
+        episodes,
+        arrived: n_arrived,
+        success_low,
+        success_high,
         worst: side.arrived.iter().map(|file| arrived(file) as f64 / file.len() as f64).fold(1.0, f64::min),
         figures,
     }

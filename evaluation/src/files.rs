@@ -41,6 +41,28 @@ pub fn say(line: &str) {
     let _ = writeln!(std::io::stderr(), "offtrack: {}", printable(line));
 }
 
+/// An error for what is there and is no folder.
+///
+/// # Errors
+///
+/// [`Error::Contents`] with its path.
+pub fn check_folder(folder: &Path) -> Result<(), Error> {
+    match folder.exists() && !folder.is_dir() {
+        true => Err(Error::contents(folder, "is a file; a folder is needed")),
+        false => Ok(()),
+    }
+}
+
+/// Makes a folder, and those that it lies in.
+///
+/// # Errors
+///
+/// [`Error::Contents`] for a file of that name, [`Error::Write`].
+pub fn make_folder(folder: &Path) -> Result<(), Error> {
+    check_folder(folder)?;
+    std::fs::create_dir_all(folder).map_err(Error::write(folder))
+}
+
 /// `text` with its line ends, and without other characters that a terminal obeys.
 pub fn harmless(text: &str) -> String {
     text.split('\n').map(printable).collect::<Vec<_>>().join("\n")

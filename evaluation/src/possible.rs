@@ -5,17 +5,14 @@
 //! what no search completes may be possible all the same, and is left out. Among other vehicles the search drives on
 //! the empty road, so that what only vehicles make impossible counts as possible.
 
-use std::sync::Arc;
-
 use offtrack::layout::{Ended, Truck};
-use offtrack::world::World;
 use serde::Serialize;
 
 use super::Evaluation;
 use super::certificate::attempt::attempts;
 use super::certificate::beam::Pass;
-use super::certificate::file;
 use super::certificate::verify::{Sequence, driven};
+use super::certificate::{emptied, file};
 use super::episode::{Episode, Summary};
 use super::groups::{self, Group};
 use crate::error::Error;
@@ -64,16 +61,6 @@ impl Possible {
 /// Indices of the episodes whose start needs a search. From one that is lost in the first step no action helps.
 pub fn to_search(finished: &[Episode]) -> impl Iterator<Item = usize> {
     (0..finished.len()).filter(|&index| finished[index].ended != Ended::Arrived && !finished[index].lost_at_start())
-}
-
-/// The world without its other vehicles.
-fn emptied(world: &Arc<World>) -> Arc<World> {
-    if world.traffic.is_none() {
-        return world.clone();
-    }
-    let mut emptied = World::clone(world);
-    emptied.traffic = None;
-    Arc::new(emptied)
 }
 
 impl Evaluation<'_> {

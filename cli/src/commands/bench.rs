@@ -40,7 +40,7 @@ pub struct Args {
     #[arg(long, value_delimiter = ',', default_value = "256,1024")]
     batch: Vec<usize>,
     /// Time for each number of transitions (s).
-    #[arg(long, default_value_t = 5.0, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 5.0)]
     seconds: f64,
     /// Write the result to this file as JSON.
     #[arg(long)]

@@ -48,7 +48,7 @@ pub struct Args {
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=1024))]
     submission: u32,
     /// Time for each number of trucks and each mode (s).
-    #[arg(long, default_value_t = 5.0, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 5.0)]
     seconds: f64,
     /// A benchmark's name, or the path of its file.
     #[arg(long, default_value = "attard2023")]

@@ -142,6 +142,25 @@ fn an_evaluation_reports_the_success_on_certified_routes() {
 }
 
 #[test]
+fn a_certificate_holds_among_vehicles_and_not_where_trucks_answer_by_different_delays() {
+    let place = certified();
+    let certificate = place.text("certificate.json");
+    let short = std::fs::read_to_string(place.file("short.toml")).unwrap();
+    let with = |table: &str| {
+        std::fs::write(place.file("other.toml"), format!("{short}\n{table}\n")).unwrap();
+        ["--certified", "--line"].map(|flag| {
+            let asked = ["--benchmark", &place.text("other.toml"), "--policy", "pursuit", "--episodes", "2"];
+            offtrack(&[&["evaluate"], &asked[..], &[flag, &certificate]].concat())
+        })
+    };
+    with("[traffic]\ndemand = [900.0]").iter().for_each(succeed);
+    for output in with("[disturbances]\naction_delay = [0, 3]") {
+        let said = refusal(&output, 2);
+        assert!(said.contains("disturbances.action_delay: [0, 3]; a search needs"), "{said}");
+    }
+}
+
+#[test]
 fn pursuit_follows_the_paths_of_a_certificate_and_the_lanes_centre_where_it_has_none() {
     let place = Place::new();
     let (certificate, report) = (place.text("certificate.json"), place.text("report.json"));

@@ -1,9 +1,9 @@
-//! What a run does where it cannot write.
+//! What runs and evaluations do where they cannot write.
 #![cfg(unix)]
 
 use std::process::Command;
 
-use crate::place::{CACHE, refusal, succeed};
+use crate::place::{CACHE, Place, refusal, succeed};
 use crate::resume::{ENDLESS, begun, bytes, interrupted, place, resume, resumed, wait_until};
 
 #[test]
@@ -57,4 +57,30 @@ fn a_full_disk_fails_a_run_only_at_its_end_after_the_evaluation() {
     }
     succeed(&place.evaluate(&["--policy", &place.text("runs/run/policy.safetensors"), "--episodes", "1"]));
     assert_eq!(place.json("runs/run/report.json")["evaluation"]["split"], "test");
+}
+
+#[test]
+fn a_report_that_cannot_be_written_is_a_failure() {
+    let place = Place::new();
+    let below_a_file = place.text("tiny.toml/report.json");
+    let said = refusal(&place.evaluate(&["--policy", "random", "--episodes", "1", "--json", &below_a_file]), 1);
+    assert!(said.contains(&below_a_file) && said.contains("cannot be written"), "{said}");
+    for flag in ["--json", "--html", "--actions"] {
+        let said = refusal(&place.evaluate(&["--policy", "random", flag, &place.text("")]), 2);
+        assert!(said.contains(flag) && said.contains("is a folder; a file is needed"), "{said}");
+    }
+    let said = refusal(&place.evaluate(&["--policy", "random", "--films", &place.text("tiny.toml")]), 2);
+    assert!(said.contains("tiny.toml: is a file; a folder is needed"), "{said}");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn the_table_and_the_other_files_are_there_where_one_cannot_be_written() {
+    let place = Place::new();
+    let actions = place.text("actions.json");
+    let evaluated =
+        place.evaluate(&["--policy", "random", "--episodes", "1", "--json", "/dev/full", "--actions", &actions]);
+    assert!(refusal(&evaluated, 1).contains("/dev/full"));
+    assert!(String::from_utf8_lossy(&evaluated.stdout).contains("20m/W-left-3"), "{evaluated:?}");
+    assert_eq!(place.json("actions.json")["episodes"].as_array().unwrap().len(), 2);
 }

@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use super::entry::{Drive, Entry, Training};
 use crate::comparison::Estimate;
+use crate::episode::wilson;
 use crate::interval::Cells;
 use crate::outcomes::Outcomes;
 use crate::tabular;
@@ -26,6 +27,10 @@ pub struct Stretch {
     pub arrived: usize,
     /// Success with its interval over routes.
     pub success: Estimate,
+    /// Lower end of Wilson's 95 % interval of success, over episodes.
+    pub success_low: f64,
+    /// Upper end of it.
+    pub success_high: f64,
     /// Mean distance to the lane centre in episodes that arrived; `None` if none did (m).
     pub lane_distance: Option<f64>,
     /// Mean time of the episodes that arrived (s).
@@ -55,6 +60,7 @@ impl Stretch {
         peaks.sort_by(f64::total_cmp);
         // The nearest rank.
         let rank = (0.99 * peaks.len() as f64).ceil() as usize;
+        let (success_low, success_high) = wilson(arrived, success.episodes());
         Stretch {
             benchmark: drive.benchmark.clone(),
             split: drive.split.clone(),
@@ -63,6 +69,8 @@ impl Stretch {
             starts: success.episodes(),
             arrived,
             success: Estimate::of(&success).unwrap_or(Estimate { mean: 0.0, low: None, high: None }),
+            success_low,
+            success_high,
             lane_distance: mean(lane),
             time: mean(outcomes.step * steps),
             load_transfer_ratio_p99: peaks.get(rank.max(1) - 1).copied().unwrap_or(0.0),
@@ -161,6 +169,8 @@ impl Board {
             "split",
             "episodes_per_route",
             "success",
+            "success_low",
+            "success_high",
             "success_low_over_routes",
             "success_high_over_routes",
             "success_elsewhere",
@@ -187,6 +197,8 @@ impl Board {
                 home.split,
                 home.episodes.to_string(),
                 home.success.mean.to_string(),
+                home.success_low.to_string(),
+                home.success_high.to_string(),
                 text(home.success.low),
                 text(home.success.high),
                 success(elsewhere),

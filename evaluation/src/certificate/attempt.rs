@@ -18,7 +18,7 @@ pub const HOLD: usize = 3;
 const WIDEST: usize = 1 << 18;
 
 /// The searches to make in turn: the widths as given, then the widest with a choice at every step. Fails on a width
-/// that is 0 or that no memory holds.
+/// that is 0 or that no memory holds, and on one that stands there twice.
 pub fn passes(widths: &[usize], hold: usize) -> Result<Vec<Pass>, Error> {
     if let Some(width) = widths.iter().find(|width| !(1..=WIDEST).contains(*width)) {
         return Err(Error::Setting {
@@ -26,6 +26,10 @@ pub fn passes(widths: &[usize], hold: usize) -> Result<Vec<Pass>, Error> {
             value: width.to_string(),
             expected: format!("must lie in 1..{WIDEST}"),
         });
+    }
+    if let Some((index, width)) = widths.iter().enumerate().find(|(index, width)| widths[..*index].contains(width)) {
+        let expected = format!("stands there again as number {}: name each width once", index + 1);
+        return Err(Error::Setting { name: "--widths", value: width.to_string(), expected });
     }
     let mut passes: Vec<Pass> = widths.iter().map(|&width| Pass { width, hold }).collect();
     if let Some(&width) = widths.iter().max()

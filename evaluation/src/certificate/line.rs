@@ -23,7 +23,7 @@ pub fn lines(path: &Path, scenario: &Scenario, world: &Arc<World>) -> Result<Lin
     let (_, mut sequences) = super::verified(path, scenario, world, &routes)?;
     sequences.dedup_by_key(|sequence| sequence.route);
     let mut driven = vec![Vec::new(); sequences.len()];
-    verify::follow(world, &sequences, |index, batch| {
+    verify::follow(&super::emptied(world), &sequences, |index, batch| {
         if batch.ended[index] == Ended::Running as u32 {
             driven[index].push(batch.truck[index].position);
         }

@@ -113,7 +113,13 @@ impl Comparison {
         let number = |value: Option<f64>| value.map(|value| value.to_string()).unwrap_or_default();
         let ends = |estimate: &Estimate| [Some(estimate.mean), estimate.low, estimate.high].map(number);
         let routes = self.routes.to_string();
-        for SideFigures { name, figures, .. } in &self.sides {
+        for SideFigures { name, figures, success_low, success_high, .. } in &self.sides {
+            if let Some(Estimate { mean, .. }) = figures.success {
+                let names = [name, "", "all", "", &routes, "success_over_episodes", "", ""].map(str::to_owned);
+                rows.push(
+                    names.into_iter().chain([mean, *success_low, *success_high].map(|end| end.to_string())).collect(),
+                );
+            }
             for figure in Figure::ALL {
                 let Some(estimate) = figures.get(figure) else { continue };
                 let names = [name, "", "all", "", &routes, figure.key(), "", ""].map(str::to_owned);

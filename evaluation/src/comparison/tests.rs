@@ -164,8 +164,11 @@ fn csv_is_read_back_and_tables_have_the_same_cells_in_markdown_and_latex() {
     assert_eq!(lines.next(), Some("side,less,kind,name,routes,figure,first,own,value,low,high"));
     let rows: Vec<Vec<&str>> =
         lines.map(|line| line.strip_prefix("\"a_b, c\"").unwrap_or(line).split(',').collect()).collect();
-    // Two sides and a difference of five figures, three routes, two roundabouts, three exits, a radius and a lane.
-    assert_eq!(rows.len(), 15 + 10);
+    // Two sides and a difference of five figures, three routes, two roundabouts, three exits, a radius and a lane; and
+    // the interval of each side over episodes.
+    assert_eq!(rows.len(), 15 + 10 + 2);
+    let wilson = wilson(10, 12);
+    assert!(csv.contains(&format!("success_over_episodes,,,{},{},{}", 10.0 / 12.0, wilson.0, wilson.1)), "{csv}");
     let find = |kind: &str, figure: &str| {
         csv.lines()
             .find(|line| {

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use glam::DVec2;
 
+use super::measure::STAGE_NAMES;
 use super::mode::Mode;
 use super::{Measured, Scale};
 use offtrack_drawing::chart::{Chart, Kind, LINES, Line, Panel, Scales};
@@ -86,6 +87,9 @@ fn words(mode: Mode) -> &'static str {
     }
 }
 
+// Each stage has a colour of its own.
+const _: () = assert!(STAGE_NAMES.len() <= LINES.len());
+
 /// A line for each stage.
 fn stage_lines(runs: &[(usize, &Measured)]) -> Vec<Line> {
     let stage = |(index, (name, colour)): (usize, (&'static str, &'static str))| {
@@ -96,6 +100,6 @@ fn stage_lines(runs: &[(usize, &Measured)]) -> Vec<Line> {
         });
         Line { name: Some(name), colour, kind: Kind::Measured(Vec::new()), points: points.collect() }
     };
-    let lines = super::measure::STAGE_NAMES.into_iter().zip(LINES).enumerate().map(stage);
+    let lines = STAGE_NAMES.into_iter().zip(LINES).enumerate().map(stage);
     lines.filter(|line| !line.points.is_empty()).collect()
 }

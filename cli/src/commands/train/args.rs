@@ -31,7 +31,7 @@ pub struct Args {
     #[arg(long, conflicts_with = "seed")]
     pub(super) seeds: Option<String>,
     /// Training time in place of the training file's (min).
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long)]
     pub(super) minutes: Option<f64>,
     /// Number of env steps in place of the training file's.
     #[arg(long)]
