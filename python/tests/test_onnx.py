@@ -172,8 +172,9 @@ def test_a_graph_that_normalises_without_clipping_and_what_is_no_graph_are_refus
     with pytest.raises(TypeError, match="it normalises without a Clip to -10..10"):
         export.from_onnx(file)
     clipped = {"w": np.ones((69, 9)), "b": np.full(69, 2.0), "low": np.float32(-10), "high": np.float32(10)}
-    nodes = node("Clip", ["a", "low", "high"], ["c"]), node("Mul", ["c", "b"], ["d"]), node("MatMul", ["d", "w"], ["y"])
-    onnx.save(graph(node("Sub", ["x", "b"], ["a"]), *nodes, constants=clipped), str(file))
+    of_clipped = node("Mul", ["c", "b"], ["d"]), node("MatMul", ["d", "w"], ["y"])
+    before = node("Sub", ["x", "b"], ["a"]), node("Clip", ["a", "low", "high"], ["c"])
+    onnx.save(graph(*before, *of_clipped, constants=clipped), str(file))
     with pytest.raises(TypeError, match="node 'd', Mul: it stands where a policy file has no place for it"):
         export.from_onnx(file)
     file.write_bytes(b"no graph")
