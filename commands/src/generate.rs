@@ -233,7 +233,8 @@ fn summary(distribution: &Distribution, args: &Args, roads: &[RandomRoad]) -> St
     let (name, seed, n) = (&distribution.name, args.seed, roads.len());
     let noun = if n == 1 { "road" } else { "roads" };
     // Writing to a string cannot fail.
-    let _ = writeln!(text, "{n} {noun} of {name}, seed {seed}: {:.1} % of {draws} draws are valid; refused:", share(n));
+    let follows = if 0 < refused.total() { "; refused:" } else { "" };
+    let _ = writeln!(text, "{n} {noun} of {name}, seed {seed}: {:.1} % of {draws} draws are valid{follows}", share(n));
     let mut reasons = Reason::ALL.to_vec();
     reasons.sort_by_key(|&reason| std::cmp::Reverse(refused.count(reason)));
     for reason in reasons.into_iter().filter(|&reason| 0 < refused.count(reason)) {
