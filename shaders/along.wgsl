@@ -74,12 +74,14 @@ fn slip_lever(rig: Rig, speed: f32) -> f32 {
     return min(rig.slip * speed * speed, rig.slip_lever_max);
 }
 
-// A point of the lane between two waypoints, of a cubic with their directions, by the fraction of the way to the second.
+// A point of the lane between two waypoints, of a cubic with their directions, by the fraction of the way to the
+// second.
 fn between(behind: WaypointRow, ahead: WaypointRow, fraction: f32) -> vec2<f32> {
     let rest = 1.0 - fraction;
     let bulge = rest * behind.direction - fraction * ahead.direction;
     let shift = (distance(behind.position, ahead.position) * rest * fraction) * bulge;
-    return behind.position + (fraction * fraction * (3.0 - 2.0 * fraction)) * (ahead.position - behind.position) + shift;
+    let share = fraction * fraction * (3.0 - 2.0 * fraction);
+    return behind.position + share * (ahead.position - behind.position) + shift;
 }
 
 // Heading of a unit of a length (m), from its front end to where it rolls, once its front end has gone this way (m),

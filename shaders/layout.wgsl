@@ -1124,7 +1124,7 @@ struct BatchFacts {
 @group(0) @binding(22) var<storage, read_write> ended: array<u32>;
 // Physical amounts that the reward weighs, [n_envs].
 @group(0) @binding(23) var<storage, read_write> terms: array<RewardTerms>;
-// Rewards of the last step; a truck that waits for its group keeps that of its last one, [n_envs].
+// Rewards of the last step; of a truck that waits for its group, of its own last one, [n_envs].
 @group(0) @binding(24) var<storage, read_write> reward: array<f32>;
 // What is observed beside the observation before the next action; zeros beyond what the benchmark observes, [n_envs, 12].
 @group(0) @binding(25) var<storage, read_write> extras: array<f32>;

@@ -27,8 +27,8 @@ pub fn of_run(folder: &Path) -> [PathBuf; 7] {
 const DEPTH: usize = 3;
 
 /// An error if two of the files to be written are one, or one of them is a file that is read, or one that such a file
-/// names: a vehicle of a benchmark, which the second would replace; or if one is a folder or in one that there is not, so
-/// that what was computed for it would be lost.
+/// names: a vehicle of a benchmark, which the second would replace; or if one is a folder or in one that there is
+/// not, so that what was computed for it would be lost.
 pub fn distinct(written: &[Named], read: &[Named]) -> Result<(), Error> {
     let mut named = Vec::new();
     for (flag, file) in read {

@@ -178,7 +178,8 @@ pub fn unknown(scenario: &Scenario, flag: &'static str, name: &str) -> Error {
     let expected = match meant {
         Some(place) => format!("of {} the benchmark {from} has {list}", place.roundabout.name),
         None => format!(
-            "a route of the benchmark {from} is needed, such as {list}, or one of a random road, such as wide/7/12/S-left-3"
+            "a route of the benchmark {from} is needed, such as {list}, or one of a random road, such as \
+             wide/7/12/S-left-3"
         ),
     };
     Error::Setting { name: flag, value: name.to_owned(), expected }

@@ -47,10 +47,10 @@ pub fn say(line: &str) {
 ///
 /// [`Error::Contents`] with its path.
 pub fn check_folder(folder: &Path) -> Result<(), Error> {
-    match folder.exists() && !folder.is_dir() {
-        true => Err(Error::contents(folder, "is a file; a folder is needed")),
-        false => Ok(()),
+    if folder.exists() && !folder.is_dir() {
+        return Err(Error::contents(folder, "is a file; a folder is needed"));
     }
+    Ok(())
 }
 
 /// Makes a folder, and those that it lies in.

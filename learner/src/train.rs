@@ -255,7 +255,7 @@ impl Training {
         let mut page = Ok(());
         if let Some((report, tracks)) = evaluated {
             let metrics = read_text(&folder.metrics(), METRICS_LIMIT)
-                .map_err(|error| caller.tell(Event::Warning(&format!("{error}; the page has no curves"))))
+                .inspect_err(|error| caller.tell(Event::Warning(&format!("{error}; the page has no curves"))))
                 .ok();
             let (scenario, world) = (&self.worlds.benchmark, &self.worlds.benchmark_world);
             page = Page { scenario, world, evaluation: &report, tracks: &tracks, run: json!(outcome), metrics }

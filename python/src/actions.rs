@@ -119,15 +119,11 @@ impl Of {
                 array.len()
             ))));
         }
-        let array = match aligned(array) {
-            Ok(array) => array,
-            Err(error) => return Some(Err(error)),
-        };
         let known = |(env, &action): (usize, &T)| match u32::try_from(action) {
             Ok(index) if index < limit => Ok(index),
             _ => Err(PyValueError::new_err(format!("actions[{env}]: {action}; must lie in 0..{}", limit - 1))),
         };
-        Some(array.as_array().iter().enumerate().map(known).collect())
+        Some(aligned(array).and_then(|array| array.as_array().iter().enumerate().map(known).collect()))
     }
 }
 

@@ -105,8 +105,8 @@ impl Area {
         Area { parts: self.parts.iter().map(part).filter(|part: &Part| !part.is_empty()).collect() }
     }
 
-    /// The area by contours that do not cross themselves, without spikes narrower than `tolerance`, and without contours
-    /// of less than a size (m, m²).
+    /// The area by contours that do not cross themselves, without spikes narrower than `tolerance`, and without
+    /// contours of less than a size (m, m²).
     pub(crate) fn tidied(&self, tolerance: f64, smallest: f64) -> Area {
         let spikeless = |area: &Area| {
             let part = |part: &Part| part.iter().map(|contour| without_spikes(contour, tolerance)).collect();

@@ -35,7 +35,7 @@ macro_rules! columns {
             Ended ended: u32,
             /// Physical amounts that the reward weighs
             Terms terms: RewardTerms,
-            /// Rewards of the last step; a truck that waits for its group keeps that of its last one
+            /// Rewards of the last step; of a truck that waits for its group, of its own last one
             Reward reward: f32,
             /// What is observed beside the observation before the next action; zeros beyond what the benchmark observes
             Extras extras: [f32; N_EXTRAS],

@@ -53,8 +53,8 @@ impl Scenario {
         let [fewest, most] = scenario.substeps();
         if !(fewest..=most).contains(&f64::from(scenario.n_substeps)) {
             let expected = format!(
-                "must lie in {fewest}..{most}: at most the trailer's lever is driven in a sub-step, which takes 1 ms at \
-                 least"
+                "must lie in {fewest}..{most}: at most the trailer's lever is driven in a sub-step, which takes 1 ms \
+                 at least"
             );
             return Err(reader.invalid("time.substeps", scenario.n_substeps, expected));
         }

@@ -15,7 +15,7 @@ use crate::vehicle::GRAVITY;
 const LOAD_TRANSFER_MAX: f64 = 0.7;
 /// Fraction of the tyres' grip that a bend may take: what is left is for steering.
 const GRIP_MAX: f64 = 0.8;
-/// Least that a road's fall leaves of what the trailer's load holds, so that a truck that it nearly tips crawls (m/s^2).
+/// Least that a road's fall leaves of what the trailer's load holds: a truck that it nearly tips crawls (m/s^2).
 const HELD_MIN: f64 = 0.005 * GRAVITY;
 /// Mean braking that the speed control reaches where it asks for more as the error grows (m/s^2).
 const BRAKING: f64 = 1.2;

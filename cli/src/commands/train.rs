@@ -125,8 +125,8 @@ fn check_settings(args: &Args) -> Result<(), Error> {
     Ok(())
 }
 
-/// Lets Ctrl-C, SIGTERM and SIGHUP stop the run: the first lets the step in hand finish and everything be written, the
-/// second ends the process.
+/// Lets Ctrl-C, SIGTERM and SIGHUP stop the run: the first lets the step in hand finish and everything be written, one
+/// that is not of the same moment ends the process.
 fn stop_on_signals(display: &Display) {
     let mut stop = Some(display.stopper());
     let mut stopped = Instant::now();

@@ -85,18 +85,20 @@ fn slip_lever(rig: &Rig, speed: f32) -> f32 {
     (rig.slip * speed * speed).min(rig.slip_lever_max)
 }
 
-/// A point of the lane between two waypoints, of a cubic with their directions, by the fraction of the way to the second.
+/// A point of the lane between two waypoints, of a cubic with their directions, by the fraction of the way to the
+/// second.
 fn between(behind: &WaypointRow, ahead: &WaypointRow, fraction: f32) -> Vec2 {
     let rest = 1.0 - fraction;
     let bulge = rest * behind.direction - fraction * ahead.direction;
     let shift = (behind.position.distance(ahead.position) * rest * fraction) * bulge;
-    behind.position + (fraction * fraction * (3.0 - 2.0 * fraction)) * (ahead.position - behind.position) + shift
+    let share = fraction * fraction * (3.0 - 2.0 * fraction);
+    behind.position + share * (ahead.position - behind.position) + shift
 }
 
 /// Heading of a unit of a length (m), from its front end to where it rolls, once its front end has gone this way (m),
-/// which is a straight piece of a bend. On a line the unit lies on a tractrix: the tangent of half its angle to the line
-/// falls exponentially with the way. Here it falls by the exponential's approximation of order (1, 1), with which units
-/// on the chords of a circle come to the angle that they have on the circle.
+/// which is a straight piece of a bend. On a line the unit lies on a tractrix: the tangent of half its angle to the
+/// line falls exponentially with the way. Here it falls by the exponential's approximation of order (1, 1), with which
+/// units on the chords of a circle come to the angle that they have on the circle.
 fn pulled(heading: Vec2, unit_length: f32, way: Vec2) -> Vec2 {
     let gone = way.length();
     if gone < TINY {

@@ -255,6 +255,7 @@ fn left(faces: &Outline, triangles: Vec<Vec<DVec2>>) -> Outline {
     let lanes = lanes.without_slits(SLIT, 0.0);
     let size = |part: &[Vec<[f64; 2]>]| part.iter().map(|contour| signed_area(contour)).sum::<f64>();
     let largest = lanes.parts.iter().max_by(|one, other| size(one).total_cmp(&size(other)));
+    // Rounded corners stay: benchmarks with these edges keep their bits.
     let loops = largest.into_iter().flatten().map(|contour| bulging_outline(&points(contour), FITTED, f64::INFINITY));
     Outline::new(loops.filter(|curve| !curve.pieces.is_empty()).collect())
 }
