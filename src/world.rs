@@ -4,6 +4,7 @@
 //! tables are public, to be read and to be changed by who compares what a change does; a change is not checked.
 
 mod fingerprint;
+mod step_limits;
 mod traffic;
 
 use std::f64::consts::PI;
@@ -20,9 +21,9 @@ use crate::layout::{
     WaypointRow,
 };
 use crate::map::Frame;
-use crate::map::route::{Route, Waypoint};
-use crate::scenario::{ActionKind, Class, Clock, Entry, Invalid, Place, Scenario};
-use crate::vehicle::profile::Profile;
+use crate::map::route::Waypoint;
+use crate::scenario::{ActionKind, Class, Entry, Invalid, Place, Scenario};
+use step_limits::step_limits;
 pub use traffic::{Level, Traffic, TrafficRoad, TrafficRoute};
 
 /// Waypoints to the corner of each observed curvature.
@@ -66,7 +67,7 @@ pub struct World {
     pub routes: Vec<RouteRow>,
     /// `20m/N-left-3` and the like.
     pub route_names: Vec<String>,
-    /// Steps after which an episode is timed out, `[n_routes, n_classes]`.
+    /// Steps after which an episode is timed out, in the next one, `[n_routes, n_classes]`.
     pub step_limits: Vec<u32>,
 }
 
@@ -205,10 +206,16 @@ impl World {
         &self.rigs[truck.vehicle as usize]
     }
 
-    /// Steps after which a truck's episode is timed out.
+    /// Steps after which a truck's episode is timed out, in the next one.
     #[inline]
     pub fn step_limit(&self, truck: &Truck) -> u32 {
         self.step_limits[(truck.route * self.params.n_classes + self.rig(truck).class_index) as usize]
+    }
+
+    /// Most steps of a truck's episode: those of its limit, and the one that times out or arrives.
+    #[inline]
+    pub fn most_steps(&self, truck: &Truck) -> usize {
+        self.step_limit(truck) as usize + 1
     }
 
     /// A rig's distance sensors, trailer's first.
@@ -303,42 +310,6 @@ fn fields(scenario: &Scenario, loading: &Loading) -> Result<(Vec<Field>, Vec<Opt
     let fields = scenario.places.par_iter().map(field).collect::<Result<Vec<_>, Stopped>>();
     loading.cache.inspect(|cache| cache.prune());
     Ok(fields?.into_iter().unzip())
-}
-
-/// Steps after which an episode is timed out, `[n_routes, n_classes]`: multiples of the time that a route takes at the
-/// highest target speed, or of that of the feasible profile of the class as its file has it.
-fn step_limits(
-    scenario: &Scenario,
-    substep: f32,
-    waypoints: &[WaypointRow],
-    routes: &[RouteRow],
-    loading: &Loading,
-) -> Result<Vec<u32>, Stopped> {
-    let waiting = scenario.traffic.as_ref().map_or(0.0, |traffic| traffic.waiting);
-    let waiting = (waiting / scenario.step).ceil() as u32;
-    let steps = |time: f64| (scenario.time_limit * time / scenario.step).ceil() as u32 + waiting;
-    match scenario.clock {
-        Clock::HighestSpeed => {
-            let n_classes = scenario.classes().len();
-            let length = |route: &Route| route.centre_line.length();
-            // In this order of operations for as long as there have been benchmarks.
-            let limit = |route| {
-                (scenario.time_limit * length(route) / (scenario.cruising_speed() * scenario.step)).ceil() as u32
-                    + waiting
-            };
-            Ok(scenario.routes().flat_map(|(_, route)| std::iter::repeat_n(limit(route), n_classes)).collect())
-        }
-        Clock::Feasible => {
-            let rigs = scenario.typical_rigs(substep);
-            let fastest = scenario.cruising_speed();
-            let of_route = |route: &RouteRow| {
-                let waypoints = &waypoints[route.first as usize..][..route.n_waypoints as usize];
-                loading.check()?;
-                Ok(rigs.iter().map(|rig| steps(Profile::of(rig, waypoints, fastest).time)).collect())
-            };
-            Ok(routes.par_iter().map(of_route).collect::<Result<Vec<Vec<u32>>, Stopped>>()?.concat())
-        }
-    }
 }
 
 fn waypoint_row(waypoint: &Waypoint) -> WaypointRow {

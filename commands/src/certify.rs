@@ -89,10 +89,12 @@ fn again(path: &Path, benchmark: Option<&str>, load: Option<&str>) -> Result<(),
     };
     let scenario = benchmark.map_or_else(own, roads::benchmark)?;
     let mut scenario = roads::with_load(scenario, load)?;
-    // Random roads that the benchmark does not have are drawn again.
+    // Roads that the benchmark does not have are read or drawn again. Files of before do not say what was asked for.
     let is_random = |name: &String| name.rsplit_once('/').is_some_and(|(road, _)| procedural::address(road).is_some());
     let names: Vec<String> = certificate.routes.iter().map(|route| route.name.clone()).collect();
-    if names.iter().any(is_random) {
+    if !certificate.asked.is_empty() {
+        roads::narrow(&mut scenario, "--route", &certificate.asked, &Split::ALL)?;
+    } else if names.iter().any(is_random) {
         roads::narrow(&mut scenario, "--route", &names, &Split::ALL)?;
     }
     let world = roads::world(&scenario)?;
@@ -132,8 +134,9 @@ fn certify(args: &Args) -> Result<(), Error> {
     }
     let name = policy.as_ref().map(|policy| policy.name.clone());
     let mut certificate = Certificate::new(&scenario, &world, &args.split, name, passes.clone(), &STARTS);
-    // As it was given, so that --verify finds a file of one's own again.
+    // As they were given, so that --verify finds files of one's own again.
     certificate.benchmark = benchmark.to_owned();
+    certificate.asked = args.route.clone();
     let started = Instant::now();
     let bar = progress::Bar::new("certifying", "starts", routes.len() * STARTS.len());
     let mut failures = 0;

@@ -283,8 +283,8 @@ fn driven(
     let begun = Episodes::begin(engine.clone(), world.clone(), routes, args.episodes, args.seed)?;
     let mut simulator = begun.into_simulator();
     let mut recorder = Recorder::new(world, simulator.batch(), [env]);
-    let limit = world.step_limit(&simulator.batch().truck[env]);
-    let bar = progress::Bar::new("driving", "steps", limit as usize);
+    let most = world.most_steps(&simulator.batch().truck[env]);
+    let bar = progress::Bar::new("driving", "steps", most);
     while recorder.is_running() {
         policy.step(&mut simulator)?;
         recorder.follow(world, simulator.batch());

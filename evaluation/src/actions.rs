@@ -58,7 +58,7 @@ impl Recorded {
         if let Some((key, found, expected)) = numbers.into_iter().find(|(_, found, expected)| found != expected) {
             return Err(wrong(format!("{key}: {found}; {expected} are needed")));
         }
-        let limit = world.step_limits.iter().copied().max().unwrap_or(0) as usize;
+        let limit = world.step_limits.iter().copied().max().unwrap_or(0) as usize + 1;
         let sequence = |(episode, text): (usize, &String)| {
             actions(text, n_actions, limit).map_err(|message| wrong(format!("episodes, {episode}: {message}")))
         };
@@ -129,5 +129,24 @@ mod tests {
         assert!(refused(6).contains("episodes, 0: actions: \"9x1\""), "{}", refused(6));
         std::fs::write(&file, "{}").unwrap();
         assert!(refused(6).contains("`evaluate --actions` writes such files"));
+    }
+
+    #[test]
+    fn the_action_of_the_step_in_which_time_is_over_is_driven_again_too() {
+        let mut scenario = Scenario::named("attard2023").unwrap();
+        scenario.retain(|_, route| route.name == "40m/E-left-1");
+        let mut world = World::bake(&scenario).unwrap();
+        world.step_limits.fill(3);
+        let (world, device) = (Arc::new(world), Device::processor());
+        let (split, episodes, seed, record) = (Split::Test, 8, 4, false);
+        let evaluation =
+            Evaluation { scenario: &scenario, world: &world, split, episodes, seed, record, device: &device };
+        let first = evaluation.drive(&mut UniformRandom { seed: 4 }, &mut |_, _| ()).unwrap();
+        assert!(first.episodes.iter().all(|episode| episode.steps == 4));
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("actions.json");
+        first.sequences.write(&file, &world).unwrap();
+        let mut recorded = Recorded::read(&file, &world, 8).unwrap();
+        assert_eq!(evaluation.drive(&mut recorded, &mut |_, _| ()).unwrap().episodes, first.episodes);
     }
 }

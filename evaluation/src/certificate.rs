@@ -104,7 +104,29 @@ fn verified(
 
 #[cfg(test)]
 mod tests {
+    use offtrack::layout::{Start, Truck};
+
+    use super::attempt::{attempt, passes};
+    use super::file::CertifiedRoute;
     use super::*;
+
+    #[test]
+    fn a_sequence_that_arrives_in_the_step_after_the_limit_is_verified() {
+        let mut scenario = Scenario::named("attard2023").unwrap();
+        scenario.retain(|_, route| route.name == "20m/E-right-1");
+        let world = World::bake(&scenario).unwrap();
+        let passes = passes(&[16], 2).unwrap();
+        let certified = |world: &Arc<World>| attempt(world, 0, &Start::default(), &passes, None).unwrap();
+        let found = certified(&Arc::new(world.clone()));
+        assert!(found.arrived() && found.steps < world.step_limit(&Truck::default()));
+        let mut shorter = world;
+        shorter.step_limits.fill(found.steps - 1);
+        let shorter = Arc::new(shorter);
+        let mut certificate = Certificate::new(&scenario, &shorter, "all", None, passes, &[Start::default()]);
+        certificate.routes = vec![CertifiedRoute { name: shorter.route_names[0].clone(), found: vec![found] }];
+        let sequences = verify::verify(&certificate, &shorter, Path::new("its file"), |_| true).unwrap();
+        assert_eq!(sequences[0].actions.len() as u32, shorter.step_limits[0] + 1);
+    }
 
     #[test]
     fn a_search_is_refused_where_trucks_answer_by_different_delays() {

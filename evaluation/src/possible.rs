@@ -78,7 +78,7 @@ impl Evaluation<'_> {
         let starts: Vec<_> = searched.iter().map(|&index| self.start(index)).collect();
         let searches = attempts(&world, &starts, passes, &|_, _| done())?;
         let sequences = searches.iter().zip(&starts).map(|(found, &(route, start))| {
-            let limit = world.step_limit(&Truck { route, vehicle: start.vehicle, ..Truck::default() }) as usize;
+            let limit = world.most_steps(&Truck { route, vehicle: start.vehicle, ..Truck::default() });
             let actions = file::actions(&found.actions, world.params.n_actions, limit).unwrap_or_default();
             Sequence { route, start, actions }
         });

@@ -240,6 +240,20 @@ fn a_policy_may_be_among_the_candidates_and_must_fit_the_benchmark() {
 }
 
 #[test]
+fn a_certificate_of_roads_of_an_own_distribution_draws_them_again_from_its_file() {
+    let place = Place::new();
+    let shipped = std::fs::read_to_string("../scenarios/distributions/wide.toml").unwrap();
+    // Of the name of a shipped one, and of other roads.
+    let own = shipped.replace("island_radius = [7.3, 28.0]", "island_radius = [16.0, 16.5]");
+    assert_ne!(own, shipped);
+    std::fs::write(place.text("wide.toml"), own).unwrap();
+    let (json, route) = (place.text("c.json"), place.text("wide.toml/7/12/S-left-4"));
+    succeed(&offtrack(&["certify", "--route", &route, "--widths", "16", "--hold", "5", "--json", &json]));
+    assert_eq!(place.json("c.json")["asked"], Value::from(vec![route]));
+    succeed(&offtrack(&["certify", "--verify", &json]));
+}
+
+#[test]
 fn a_result_states_the_commit_of_the_build_and_not_that_of_the_sources_when_it_runs() {
     let place = certified();
     // A git that says something else when the program runs.

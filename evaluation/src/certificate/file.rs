@@ -40,6 +40,9 @@ pub struct Certificate {
     pub benchmark: String,
     /// `test`, `train`, `validation` or `all`.
     pub split: String,
+    /// The routes and roads that were asked for, as they were given; empty where all of the split were.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub asked: Vec<String>,
     /// The policy whose actions were among the candidates.
     pub policy: Option<String>,
     /// Conditions that must be equal where the file is used, by name.
@@ -118,6 +121,7 @@ impl Certificate {
             version: VERSION,
             benchmark: scenario.name.clone(),
             split: split.to_owned(),
+            asked: Vec::new(),
             policy,
             conditions: conditions(scenario, world),
             passes,

@@ -80,8 +80,8 @@ pub fn verify(
             route.found.iter().zip(&certificate.starts).filter(|(found, _)| found.arrived())
         {
             let damaged = |message| wrong(format!("is a damaged certificate: {}: {message}", route.name));
-            // Beyond the time limit of its route no action changes the outcome.
-            let limit = world.step_limit(&Truck { route: index as u32, ..Truck::default() }) as usize;
+            // Beyond the last step of an episode no action changes the outcome.
+            let limit = world.most_steps(&Truck { route: index as u32, ..Truck::default() });
             let actions = file::actions(&found.actions, world.params.n_actions, limit).map_err(damaged)?;
             sequences.push(Sequence {
                 route: index as u32,

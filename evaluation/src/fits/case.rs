@@ -200,7 +200,7 @@ impl Case {
     /// The way that a search found, driven again, and what it asks.
     fn driven(&self, route: usize, found: &Found) -> Result<(Path, Asks), Error> {
         let route = route as u32;
-        let limit = self.world.step_limit(&Truck { route, ..Truck::default() }) as usize;
+        let limit = self.world.most_steps(&Truck { route, ..Truck::default() });
         let actions = file::actions(&found.actions, self.world.params.n_actions, limit)
             .map_err(|message| Error::contents(std::path::Path::new("fits.json"), message))?;
         let mut trucks: Vec<Truck> = Vec::new();
