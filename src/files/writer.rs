@@ -2,14 +2,14 @@
 //!
 //! Symbolic links are followed, and what is not a regular file (a device, a pipe, standard output) is written into as
 //! it is. A regular file is replaced in one move once all of it is on the disk; owner and permissions stay those of the
-//! file that it replaces.
+//! file that it replaces. One whose owner cannot be kept so is written over once everything is in a file beside it.
 
 mod temporary;
 #[cfg(test)]
 mod tests;
 
 use std::fs::{self, File, Metadata, OpenOptions};
-use std::io::{self, ErrorKind, Write};
+use std::io::{self, ErrorKind, Seek, Write};
 use std::path::{Path, PathBuf};
 
 use temporary::Temporary;
@@ -27,6 +27,8 @@ pub struct Output(Way);
 enum Way {
     /// A temporary file will take the place of `target`, a path without links.
     Replaced { target: PathBuf, temporary: Temporary },
+    /// A file that must stay itself: what the temporary file holds is copied into it.
+    Copied { into: File, temporary: Temporary },
     /// What cannot be replaced is written into.
     Opened(File),
 }
@@ -60,23 +62,25 @@ impl Output {
         let target = followed(file);
         let temporary = Temporary::create(folder_of(&target), Some(&found))?;
         if keep_access(&found, temporary.file()).is_err() {
-            // Nobody but root can give a file away: one of another owner is written in place.
-            opened.set_len(0)?;
-            return Ok(Output(Way::Opened(opened)));
+            // Nobody but root can give a file away: one of another owner stays itself.
+            return Ok(Output(Way::Copied { into: opened, temporary }));
         }
         Ok(Output(Way::Replaced { target, temporary }))
     }
 
-    /// Puts what was written into its place. A regular file is on the disk before.
+    /// Puts what was written into its place. A regular file is on the disk before; one that belongs to another user,
+    /// whose owner only root could keep, is copied into, and holds a part of it if that fails.
     ///
     /// # Errors
     ///
     /// The disk is full or broken, or the folder may not be written any more.
     pub fn finish(self) -> io::Result<()> {
-        if let Way::Replaced { temporary, .. } = &self.0 {
+        if let Way::Replaced { temporary, .. } | Way::Copied { temporary, .. } = &self.0 {
             temporary.file().sync_all()?;
         }
-        self.finish_unsynced()
+        let copied = if let Way::Copied { into, .. } = &self.0 { Some(into.try_clone()?) } else { None };
+        self.finish_unsynced()?;
+        copied.map_or(Ok(()), |into| into.sync_all())
     }
 
     /// Puts what was written into its place without waiting for the disk: after a crash of the system the file may have
@@ -88,6 +92,12 @@ impl Output {
     pub fn finish_unsynced(self) -> io::Result<()> {
         match self.0 {
             Way::Replaced { target, temporary } => temporary.put(&target),
+            Way::Copied { mut into, temporary } => {
+                let mut whole = temporary.file();
+                whole.rewind()?;
+                into.set_len(0)?;
+                io::copy(&mut whole, &mut into).map(drop)
+            }
             Way::Opened(_) => Ok(()),
         }
     }
@@ -96,7 +106,7 @@ impl Output {
 impl Write for Output {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         match &mut self.0 {
-            Way::Replaced { temporary, .. } => temporary.file().write(bytes),
+            Way::Replaced { temporary, .. } | Way::Copied { temporary, .. } => temporary.file().write(bytes),
             Way::Opened(file) => file.write(bytes),
         }
     }

@@ -71,11 +71,11 @@ impl Temporary {
     }
 }
 
-/// How a file is opened: for writing, for nobody whom `access` shuts out.
+/// How a file is opened: for writing, and for reading it back, for nobody whom `access` shuts out.
 #[cfg_attr(not(unix), expect(unused_variables, reason = "elsewhere a new file has the permissions of its folder"))]
 pub(super) fn options(access: Option<&Metadata>) -> OpenOptions {
     let mut options = OpenOptions::new();
-    options.write(true);
+    options.write(true).read(true);
     #[cfg(unix)]
     {
         use std::os::unix::fs::{MetadataExt, OpenOptionsExt};

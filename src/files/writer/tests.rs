@@ -115,6 +115,26 @@ mod unix {
     }
 
     #[test]
+    fn a_file_whose_owner_cannot_be_kept_stays_itself_and_changes_once_all_is_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("file");
+        fs::write(&file, "of before, and longer").unwrap();
+        let found = fs::metadata(&file).unwrap();
+        let begun = || {
+            let into = OpenOptions::new().write(true).open(&file).unwrap();
+            let temporary = Temporary::create(folder.path(), Some(&found)).unwrap();
+            let mut output = Output(Way::Copied { into, temporary });
+            output.write_all(b"new").unwrap();
+            output
+        };
+        drop(begun());
+        assert_eq!(fs::read_to_string(&file).unwrap(), "of before, and longer");
+        begun().finish().unwrap();
+        assert_eq!(fs::read_to_string(&file).unwrap(), "new");
+        assert_eq!((fs::metadata(&file).unwrap().ino(), names(folder.path())), (found.ino(), vec!["file".to_owned()]));
+    }
+
+    #[test]
     fn a_file_that_may_not_be_written_is_not_replaced() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("file");
