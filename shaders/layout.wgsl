@@ -42,6 +42,8 @@ const IS_FIRST: u32 = 2u;
 const HAS_ROUTE: u32 = 4u;
 // Bit: its start is stated.
 const HAS_START: u32 = 8u;
+// Bit: its start is drawn, but for offset and heading, which are the lane's.
+const IS_CENTRED: u32 = 16u;
 // Half a turn.
 const PI: f32 = 3.1415927f;
 // A turn.
@@ -536,6 +538,9 @@ const LEAST_ROOM: f32 = 0.15f;
 const BEFORE_CONTACT: f32 = 1.0f;
 // A truck has entered lately if it did so within so many steps.
 const LATELY: u32 = 30u;
+// The step, plus 1, in which a truck entered that begins an episode beyond its line: not lately, in words that
+// wrap.
+const ENTERED_BEFORE: u32 = 4294967267u;
 // A car has entered lately if it is not farther behind its line than it drives in this time, or than it comes in
 // it from standing (2^-10 m).
 const FROM_STANDING: i32 = 9216i;
@@ -759,7 +764,7 @@ struct BeginRow {
     // Index of the episode's route in the world, where `HAS_ROUTE` is set.
     route: u32,
     // Bits: `BEGINS`, `IS_FIRST`, `HAS_ROUTE`,
-    // `HAS_START`.
+    // `HAS_START`, `IS_CENTRED`.
     what: u32,
 }
 

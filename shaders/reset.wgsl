@@ -107,7 +107,7 @@ fn start(env: u32, begin: BeginRow) {
         let vehicle = index_below(kind.x, params.n_vehicles);
         let along = params.start_along * (0.5 * (signed_unit(kind.z) + 1.0));
         start = Start(signed_unit(pose.x), signed_unit(pose.y), signed_unit(kind.y), along, vehicle);
-        if shares {
+        if shares || (begin.what & IS_CENTRED) != 0u {
             // Off their lanes' centres, trucks beside each other may stand in each other.
             start.offset = 0.0;
             start.heading = 0.0;

@@ -95,7 +95,10 @@ fn arrive(env: u32) {
     let network = network_of(truck[env].route);
     let view = view_of(env, network);
     let row = env * N_CAR_WORDS;
-    if !view.waits && cars[row + ENTERED_AT] == 0u { cars[row + ENTERED_AT] = truck[env].steps + 1u; }
+    if !view.waits && cars[row + ENTERED_AT] == 0u {
+        let steps = truck[env].steps;
+        cars[row + ENTERED_AT] = select(steps + 1u, ENTERED_BEFORE, steps == 0u);
+    }
     let hindered_before = cars[row + HINDERED_AT];
     var hindered = 0u;
     for (var slot = 0u; slot < N_CARS; slot++) {
@@ -280,13 +283,15 @@ fn clear_around(env: u32, network: Network, mate: u32) {
     }
 }
 
-// Reward for the vehicles that brake for a truck.
+// Reward for the vehicles that drive and brake for a truck.
 fn hindrance(env: u32) -> f32 {
     let hindered = cars[env * N_CAR_WORDS + HINDERED_AT];
     var brakes = 0.0;
     for (var slot = 0u; slot < N_CARS; slot++) {
-        let acceleration = f32(car_at(env, slot).acceleration) / STATE_ACCELERATION;
-        if ((hindered >> slot) & 1u) == 1u { brakes += max(-acceleration - GENTLE, 0.0); }
+        let car = car_at(env, slot);
+        let acceleration = f32(car.acceleration) / STATE_ACCELERATION;
+        // One that stands keeps its deceleration, and does not brake.
+        if ((hindered >> slot) & 1u) == 1u && 0 < car.speed { brakes += max(-acceleration - GENTLE, 0.0); }
     }
     return bitcast<f32>(limits[arrayLength(&limits) - 1u]) * brakes;
 }

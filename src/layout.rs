@@ -76,6 +76,8 @@ constants! {
     pub const HAS_ROUTE: u32 = 4;
     /// Bit: its start is stated.
     pub const HAS_START: u32 = 8;
+    /// Bit: its start is drawn, but for offset and heading, which are the lane's.
+    pub const IS_CENTRED: u32 = 16;
 }
 
 /// Every shared struct.

@@ -19,7 +19,7 @@ pub use crate::engine::{Autoreset, Batch, Error, RouteChoice, Tally, available_m
 use crate::layout::{BEGINS, BeginRow, Column, Command, HAS_ROUTE, HAS_START, IS_FIRST, Start, Stream};
 use crate::world::World;
 pub use actions::Actions;
-use check::{check_alone, check_begins, check_drawn, check_known, check_routes, check_start};
+use check::{centre_beside, check_alone, check_begins, check_drawn, check_known, check_routes, check_start};
 use state::check_state;
 
 /// What steps a batch.
@@ -199,6 +199,7 @@ impl Simulator {
             has_stream |= stream.is_some();
         }
         check_begins(&self.world, &begins)?;
+        centre_beside(&self.world, &mut begins);
         self.batch.begin(&self.world, &begins, has_stream.then_some(streams.as_slice()))
     }
 

@@ -51,7 +51,9 @@ pub use run::{Run, overlaps};
 pub use snapshots::{N_SNAPSHOTS, Snapshots};
 pub use step::{N_TURNS, Setting, advance, decide, step};
 pub use survey::Survey;
-pub use truck::{Contact, Entry, Met, Trucks, View, may_be_within, outlines, stretched, touched, touched_by};
+pub use truck::{
+    Contact, ENTERED_BEFORE, Entry, Met, Trucks, View, may_be_within, outlines, stretched, touched, touched_by,
+};
 
 use crate::files::reader::shown;
 

@@ -49,7 +49,7 @@ fn is_mates_fault(env: u32, network: Network, tractor: Outline, trailer: Outline
     return cuts_in || is_touching(before.tractor, before.trailer, mate);
 }
 
-// The step of its episode in which a truck entered, plus 1; 0 before.
+// The step of its episode in which a truck entered, plus 1; 0 before; ENTERED_BEFORE if it began beyond its line.
 fn entered_in(env: u32) -> u32 {
     return cars[env * N_CAR_WORDS + ENTERED_AT];
 }

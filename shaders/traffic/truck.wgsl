@@ -231,7 +231,7 @@ fn squared_to_now(view: View, point: vec2<f32>) -> f32 {
 // Speed of a truck along a sample of a car's path (2^-14 m a step).
 fn speed_along(view: View, network: Network, car: Car, sample: u32) -> i32 {
     let at = network.samples + SAMPLE_WORDS * (path_word(network, path_of(car), 0u) + sample);
-    return in_speeds(max(dot(view.velocity, lanes_vector(at + 2u)), 0.0));
+    return clamp(in_speeds(dot(view.velocity, lanes_vector(at + 2u))), 0, FASTEST);
 }
 
 // Whether nothing of a truck's ground is in the corridor of a car with its front near a point.

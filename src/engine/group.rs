@@ -184,6 +184,12 @@ pub(super) fn shares_arms(world: &World, row: &Row, route: u32) -> bool {
     (arms.count_ones() as usize) < row.mates.len()
 }
 
+/// Whether some of these routes begin on one arm.
+pub(crate) fn share_arms(world: &World, routes: impl ExactSizeIterator<Item = u32>) -> bool {
+    let n = routes.len();
+    (routes.fold(0u32, |arms, route| arms | 1 << begins_in(world, route)[0]).count_ones() as usize) < n
+}
+
 /// Where a route begins among other vehicles: index of the arm, and of the lane among all of the road; zeros where
 /// there are none.
 pub(crate) fn begins_in(world: &World, route: u32) -> [u32; 2] {

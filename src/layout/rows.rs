@@ -131,7 +131,7 @@ crate::shared! {
         /// Index of the episode's route in the world, where [`crate::layout::HAS_ROUTE`] is set.
         pub route: u32,
         /// Bits: [`crate::layout::BEGINS`], [`crate::layout::IS_FIRST`], [`crate::layout::HAS_ROUTE`],
-        /// [`crate::layout::HAS_START`].
+        /// [`crate::layout::HAS_START`], [`crate::layout::IS_CENTRED`].
         pub what: u32,
     }
 

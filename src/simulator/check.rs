@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::engine::group::n_lanes;
+use crate::engine::group::{n_lanes, share_arms};
 use crate::engine::{Error, RouteChoice};
-use crate::layout::{BEGINS, BeginRow, HAS_ROUTE, IS_FIRST, Start};
+use crate::layout::{BEGINS, BeginRow, HAS_ROUTE, IS_CENTRED, IS_FIRST, Start};
 use crate::world::World;
 
 /// An error if the routes do not fit the world or the number of trucks.
@@ -84,6 +84,17 @@ pub(super) fn check_begins(world: &World, begins: &[BeginRow]) -> Result<(), Err
         }
     }
     Ok(())
+}
+
+/// Has trucks of a group that are to begin on one arm begin on their lanes' centres: off them they may stand in each
+/// other.
+pub(super) fn centre_beside(world: &World, begins: &mut [BeginRow]) {
+    let group = world.group();
+    for begins in begins.chunks_mut(group).filter(|begins| 1 < group && begins[0].what & HAS_ROUTE != 0) {
+        if share_arms(world, begins.iter().map(|begin| begin.route)) {
+            begins.iter_mut().for_each(|begin| begin.what |= IS_CENTRED);
+        }
+    }
 }
 
 /// An error where trucks share roads.

@@ -14,7 +14,11 @@ const U_TURN: f64 = 0.1;
 
 /// The sum of fractions of vans and of large vehicles, without what decimals lose in binary.
 pub fn together(vans: f64, large: [f64; N_LARGE]) -> f64 {
-    ((vans + large.iter().sum::<f64>()) * 1e6).round() / 1e6
+    decimal(vans + large.iter().sum::<f64>())
+}
+
+fn decimal(sum: f64) -> f64 {
+    (sum * 1e6).round() / 1e6
 }
 
 /// The kinds of cars, by their fractions.
@@ -71,7 +75,7 @@ impl Demand {
     /// [`Error::Flow`] for a flow that is negative or larger than one car a step in all; [`Error::NoRing`] where the
     /// road has no ring and more cars arrive than [`MOST_WITHOUT_RING`].
     pub fn new(network: &Network, flows: &[f64], mix: Mix) -> Result<Demand, Error> {
-        let total: f64 = flows.iter().sum();
+        let total = decimal(flows.iter().sum());
         let wrong = flows.iter().copied().find(|flow| !(0.0..=MOST).contains(flow));
         if let Some(flow) = wrong.or((MOST < total).then_some(total)) {
             return Err(Error::Flow { flow, most: MOST });

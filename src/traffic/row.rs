@@ -33,7 +33,8 @@ pub struct Row {
     pub backlog: [u32; 2],
     /// Which of the benchmark's demands the episode has.
     pub level: u32,
-    /// The step of the episode in which the truck entered, plus 1; 0 before.
+    /// The step of the episode in which the truck entered, plus 1; 0 before; [`super::ENTERED_BEFORE`] if it began
+    /// beyond its line.
     pub entered: u32,
     /// Slot, plus 1, of the car that the truck met, 64 more where the truck is at fault; 0 if it met none.
     pub met: u32,

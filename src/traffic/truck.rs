@@ -18,7 +18,7 @@ mod view; // a truck as cars see it
 use std::cell::Cell;
 
 pub(super) use contact::printed_constants as printed_contact;
-pub use contact::{Contact, Entry, Met, may_be_within, touched, touched_by};
+pub use contact::{Contact, ENTERED_BEFORE, Entry, Met, may_be_within, touched, touched_by};
 pub(super) use corridor::printed_constants as printed_corridor;
 pub(super) use line::printed_constants as printed_line;
 pub(super) use view::printed_constants as printed_view;

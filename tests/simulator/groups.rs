@@ -317,6 +317,30 @@ fn trucks_of_a_group_are_begun_together_and_on_routes_that_go_together() {
 }
 
 #[test]
+fn trucks_of_a_group_that_are_begun_on_one_arm_stand_on_their_lanes_centres_beside_each_other() {
+    let (_, world) = world(2);
+    let of = |name: &str| world.route_names.iter().position(|route| route == name).map(|route| route as u32);
+    let all = RouteChoice::Drawn((0..world.routes.len() as u32).collect());
+    let off_lane = |simulator: &Simulator| {
+        let distances = simulator.batch().progress.iter().map(|progress| progress.lane_distance);
+        distances.fold(0.0f32, f32::max)
+    };
+    for (name, engine) in engines() {
+        let mut simulator = batch_on(&engine, &world, 128, 3, all.clone());
+        for (routes, are_beside) in
+            [(["16m/N-left-2", "16m/N-right-1"], true), (["16m/N-left-2", "16m/E-right-1"], false)]
+        {
+            let begin = |env: usize| Begin { env, route: of(routes[env % 2]), ..Begin::default() };
+            simulator.begin(&(0..128).map(begin).collect::<Vec<_>>()).unwrap();
+            assert_eq!(off_lane(&simulator) < 0.05, are_beside, "{name}: {} m", off_lane(&simulator));
+            simulator.step(&[4; 128]).unwrap();
+            let ended = (0..128).filter(|&env| ended(&simulator, env) != Ended::Running).count();
+            assert_eq!(ended, 0, "{name}: {routes:?}");
+        }
+    }
+}
+
+#[test]
 fn what_groups_cannot_do_is_refused_by_what_would_do() {
     let (scenario, world) = world(4);
     let new = |n_envs, choice| Simulator::new(world.clone(), n_envs, 1, choice).map(|_| ()).unwrap_err();

@@ -166,7 +166,7 @@ fn hindrance_is_rewarded_by_how_hard_vehicles_brake_for_the_truck_and_by_nothing
         ["", "hindrance = -2.0\n"].map(|key| with_traffic(&format!("demand = [1500]\n{key}")));
     let choice = RouteChoice::Drawn(scenario.split(Split::Train).to_vec());
     let [mut one, mut other] = [without, with].map(|world| Simulator::new(world, 128, 3, choice.clone()).unwrap());
-    let mut n_hindered = 0;
+    let (mut n_hindered, mut n_standing) = (0, 0);
     for _ in 0..150 {
         one.steps_at_random(1);
         other.steps_at_random(1);
@@ -178,13 +178,17 @@ fn hindrance_is_rewarded_by_how_hard_vehicles_brake_for_the_truck_and_by_nothing
             let row = Row::of(&one.batch().cars[env]);
             assert_eq!(row, Row::of(&other.batch().cars[env]));
             let hindered = row.cars.iter().enumerate().filter(|(slot, _)| row.hindered >> slot & 1 == 1);
-            let beyond: f32 = hindered.map(|(_, car)| (-car.acceleration() - 2.0).max(0.0)).sum();
+            let hard = hindered.filter(|(_, car)| car.acceleration() < -2.0);
+            let (driving, standing): (Vec<_>, Vec<_>) = hard.partition(|(_, car)| 0.0 < car.speed());
+            let beyond: f32 = driving.iter().map(|(_, car)| -car.acceleration() - 2.0).sum();
+            n_standing += standing.len();
             let expected = one.batch().reward[env] - 2.0 * beyond;
             assert!((other.batch().reward[env] - expected).abs() < 1e-3, "{expected}");
             n_hindered += usize::from(0.0 < beyond);
         }
     }
-    assert!(20 < n_hindered, "{n_hindered}");
+    // What stands before the truck costs nothing.
+    assert!(20 < n_hindered && 20 < n_standing, "{n_hindered} {n_standing}");
 }
 
 #[test]

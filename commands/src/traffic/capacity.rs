@@ -36,6 +36,8 @@ struct Point {
     circulating: f64,
     capacity: f64,
     hcm: f64,
+    /// Its cars meet those of the arm's other lane on their way, which the manual does not know: it counts for no mean.
+    lanes_meet: bool,
 }
 
 /// A queue without end at one arm, beside one flow.
@@ -116,6 +118,7 @@ impl Case<'_> {
                 circulating,
                 capacity,
                 hcm: kind.capacity(circulating, mix.heavy()),
+                lanes_meet: self.saturated.lanes_meet[index],
             };
             (kind, point)
         };
@@ -123,7 +126,7 @@ impl Case<'_> {
     }
 }
 
-/// Means over all lanes of a kind, flow by flow: of the flow, of the capacity with its least and greatest, of the
+/// Means over all lanes of a kind that meet no other of their arm, flow by flow: of the flow, of the capacity with its least and greatest, of the
 /// manual's.
 struct Mean {
     circulating: f64,
@@ -136,7 +139,7 @@ struct Mean {
 /// The kinds of lanes and their means, flow by flow.
 fn means(points: &[(Lane, Point)]) -> BTreeMap<Lane, (&'static str, Vec<Mean>)> {
     let mut kinds: BTreeMap<Lane, (&'static str, Vec<Vec<&Point>>)> = BTreeMap::new();
-    for (kind, point) in points {
+    for (kind, point) in points.iter().filter(|(_, point)| !point.lanes_meet) {
         let (_, flows) = kinds.entry(*kind).or_insert_with(|| (point.lanes, FLOWS.map(|_| Vec::new()).to_vec()));
         flows[point.flow].push(point);
     }
@@ -160,12 +163,15 @@ fn deviation(found: f64, hcm: f64) -> String {
 
 fn text(points: &[(Lane, Point)]) -> String {
     let mut rows = vec![
-        ["road", "entry", "lane", "lanes", "circulating", "capacity", "HCM", "deviation"].map(str::to_owned).to_vec(),
+        ["road", "entry", "lane", "lanes", "circulating", "capacity", "HCM", "deviation", ""]
+            .map(str::to_owned)
+            .to_vec(),
     ];
     for (_, point) in points {
         let mut row = vec![point.road.clone(), point.arm.clone(), point.lane.to_owned(), point.lanes.to_owned()];
         row.extend([point.circulating, point.capacity, point.hcm].map(|flow| rounded(flow, 0)));
         row.push(deviation(point.capacity, point.hcm));
+        row.push(if point.lanes_meet { "lanes meet" } else { "" }.to_owned());
         rows.push(row);
     }
     let mut sums = vec![
@@ -180,7 +186,12 @@ fn text(points: &[(Lane, Point)]) -> String {
             sums.push(row);
         }
     }
-    format!("{}\nmeans over all lanes of a kind\n{}", table(&rows), table(&sums))
+    let note = if points.iter().any(|(_, point)| point.lanes_meet) {
+        "lanes meet: its cars meet those of the arm's other lane on their way; such lanes count for no mean\n"
+    } else {
+        ""
+    };
+    format!("{}{note}\nmeans over all lanes of a kind\n{}", table(&rows), table(&sums))
 }
 
 /// The means with the least and greatest of each, and the manual's curves.
@@ -199,7 +210,7 @@ fn chart(args: &Args, mix: Mix, points: &[(Lane, Point)]) -> Chart {
     Chart {
         title: format!("Capacity of entry lanes {on}"),
         subtitles: vec![
-            "Means over lanes of a kind, with the least and the greatest.".to_owned(),
+            "Means over lanes of a kind that meet no other of their arm, with the least and the greatest.".to_owned(),
             "Dashed: Highway Capacity Manual, equations 22-1 to 22-5.".to_owned(),
         ],
         panels: vec![Panel {

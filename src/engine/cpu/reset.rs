@@ -10,8 +10,8 @@ use crate::engine::{Autoreset, RouteChoice, Row, group};
 use crate::layout::angle::{direction, wrapped};
 use crate::layout::random::{self, Draw};
 use crate::layout::{
-    BEGINS, BeginRow, Control, Ended, HAS_ROUTE, HAS_START, IS_FIRST, Params, RewardTerms, Rig, Start, Stream, Truck,
-    WaypointRow,
+    BEGINS, BeginRow, Control, Ended, HAS_ROUTE, HAS_START, IS_CENTRED, IS_FIRST, Params, RewardTerms, Rig, Start,
+    Stream, Truck, WaypointRow,
 };
 use crate::world::World;
 
@@ -83,7 +83,11 @@ pub(in crate::engine) fn put(world: &World, row: &mut Row, begin: &BeginRow) {
     let start = if begin.what & HAS_START == 0 {
         let drawn = drawn_start(&world.params, seed, env, episode);
         // Off their lanes' centres, trucks beside each other may stand in each other.
-        if group::shares_arms(world, row, route) { Start { offset: 0.0, heading: 0.0, ..drawn } } else { drawn }
+        if begin.what & IS_CENTRED != 0 || group::shares_arms(world, row, route) {
+            Start { offset: 0.0, heading: 0.0, ..drawn }
+        } else {
+            drawn
+        }
     } else {
         begin.start
     };

@@ -7,7 +7,7 @@ use crate::layout::shared::constants;
 use crate::layout::{MOST_IN_GROUP, Progress, Stream, Truck};
 use crate::traffic::car::Outline;
 use crate::traffic::{
-    self, Car, Clock, Contact, Entry, Event, Met, Setting, Trucks, View, outlines, touched, touched_by,
+    self, Car, Clock, Contact, ENTERED_BEFORE, Entry, Event, Met, Setting, Trucks, View, outlines, touched, touched_by,
 };
 use crate::world::{Level, Traffic, TrafficRoad, TrafficRoute, World};
 
@@ -29,7 +29,8 @@ pub fn traffic(world: &World, row: &mut Row) {
     let TrafficRoad { network, levels } = shared.road(world, row.truck.route);
     let own = view(world, shared, row.truck, row.progress);
     if !own.waits && around.entered == 0 {
-        around.entered = row.truck.steps + 1;
+        let steps = row.truck.steps;
+        around.entered = if steps == 0 { ENTERED_BEFORE } else { steps + 1 };
     }
     let setting = Setting { network, rules: &shared.rules, demand: &levels[around.level as usize].demand };
     // The trucks of a group in their order, so that each finds the same of the vehicles.
@@ -102,7 +103,7 @@ pub fn meet(world: &World, row: &mut Row) {
     let step = row.truck.steps + 1;
     let entry = |entered: u32, path: u32| Entry {
         arm: network.source_of(path as usize).entry,
-        steps: (entered != 0).then(|| step - entered),
+        steps: (entered != 0).then(|| step.wrapping_sub(entered)),
     };
     let own = Met { rig: world.rig(row.truck), truck: row.truck, entry: entry(around.entered, path) };
     let others = row.mates.iter().enumerate().filter(|(_, mate)| mate.is_there() && mate.env != row.env);
@@ -115,13 +116,14 @@ pub fn meet(world: &World, row: &mut Row) {
     around.met = contact.map_or(0, Contact::code);
 }
 
-/// Reward for the vehicles that brake for the row's truck, if the world has any.
+/// Reward for the vehicles that drive and brake for the row's truck, if the world has any.
 pub fn hindrance(world: &World, row: &Row) -> Option<f32> {
     let (shared, words) = (world.traffic.as_ref()?, row.cars.as_deref()?);
     let around = traffic::Row::of(words);
     let brakes = |(slot, car): (usize, &Car)| {
         let is_hindered = around.hindered >> slot & 1 == 1;
-        if is_hindered { (-car.acceleration() - GENTLE).max(0.0) } else { 0.0 }
+        // One that stands keeps its deceleration, and does not brake.
+        if is_hindered && 0 < car.speed { (-car.acceleration() - GENTLE).max(0.0) } else { 0.0 }
     };
     Some(shared.hindrance * around.cars.iter().enumerate().map(brakes).sum::<f32>())
 }

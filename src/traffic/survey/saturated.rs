@@ -13,6 +13,9 @@ pub struct Saturated {
     demand: Demand,
     /// Sources of the arm.
     pub sources: Vec<usize>,
+    /// Of each whether its cars meet those of the arm's other lanes on their way, as on an approach that is narrow, or in
+    /// an exit: then these are the limit, not the circulating flow.
+    pub lanes_meet: Vec<bool>,
 }
 
 impl Survey<'_> {
@@ -52,6 +55,14 @@ impl Survey<'_> {
             let all_share = of().all(|path| shares_exit(&path));
             of().filter(|path| all_share || !shares_exit(path)).for_each(|path| flows[path] = SHARES);
         }
+        let is_used = |path: &usize| 0.0 < flows[*path];
+        let meets = |&source: &usize| {
+            let used = || own.iter().copied().filter(is_used);
+            let (its, others): (Vec<usize>, Vec<usize>) =
+                used().partition(|&path| network.paths[path].source as usize == source);
+            its.iter().any(|&path| others.iter().any(|&other| !network.zones_of(path, other).is_empty()))
+        };
+        let lanes_meet = sources.iter().map(meets).collect();
         let mut feeding: Vec<u32> = feeds.iter().map(|&path| network.paths[path].source).collect();
         feeding.dedup();
         for &path in &feeds {
@@ -59,7 +70,7 @@ impl Survey<'_> {
             let in_source = feeds.iter().filter(|&&other| network.paths[other].source == source).count();
             flows[path] = circulating / (feeding.len() * in_source) as f64;
         }
-        Ok(Some(Saturated { demand: Demand::new(network, &flows, mix)?, sources }))
+        Ok(Some(Saturated { demand: Demand::new(network, &flows, mix)?, sources, lanes_meet }))
     }
 
     fn entry(&self, path: usize) -> usize {

@@ -16,6 +16,9 @@ constants! {
     const BEFORE_CONTACT: f32 = 1.0;
     /// A truck has entered lately if it did so within so many steps.
     const LATELY: u32 = 30;
+    /// The step, plus 1, in which a truck entered that begins an episode beyond its line: not lately, in words that
+    /// wrap.
+    pub const ENTERED_BEFORE: u32 = 1u32.wrapping_sub(LATELY);
     /// A car has entered lately if it is not farther behind its line than it drives in this time, or than it comes in
     /// it from standing (2^-10 m).
     const FROM_STANDING: i32 = length(9.0);

@@ -11,7 +11,7 @@ use crate::traffic::car::Outline;
 use crate::traffic::decide::Driver;
 use crate::traffic::model::ONE;
 use crate::traffic::network::SPACING;
-use crate::traffic::units::{length, speed};
+use crate::traffic::units::length;
 use crate::traffic::{Car, Network, Sample};
 
 constants! {
@@ -120,7 +120,7 @@ pub(super) fn mind(view: &View, driver: &mut Driver) {
     let leader = (0..samples.len()).find(|&index| now[index] < room(index) * room(index));
     if let Some(index) = leader {
         let rear = length(station(index) - BEFORE_SAMPLE);
-        let speed = speed(view.velocity.dot(samples[index].direction).max(0.0));
+        let speed = view.speed_along(&samples[index]);
         let (me, gap) = (driver.me, rear - driver.me.station);
         if me.waits && me.line + BEHIND_LINE < rear {
             driver.stop_or_follow(me.line - me.station, gap, speed);
@@ -180,7 +180,7 @@ pub(super) fn ahead(view: &View, network: &Network, car: &Car) -> Option<(i32, i
     let now = to_nearest(&points, &view.now, samples[0].position);
     let room = |index: usize| points.half_widths[index] + CORRIDOR_ROOM;
     let index = (0..samples.len()).find(|&index| now[index] < room(index) * room(index))?;
-    let speed = speed(view.velocity.dot(samples[index].direction).max(0.0));
+    let speed = view.speed_along(&samples[index]);
     Some((length(index as f32 * SPACING - BEFORE_SAMPLE), speed))
 }
 

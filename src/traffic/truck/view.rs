@@ -6,10 +6,10 @@ use glam::Vec2;
 use crate::layout::angle::{direction, sin_cos};
 use crate::layout::shared::constants;
 use crate::layout::{Body, Rig, Truck};
-use crate::traffic::Network;
 use crate::traffic::car::Outline;
 use crate::traffic::model::{FASTEST, square, still_stops, way_of_a_second};
 use crate::traffic::units::{length, speed};
+use crate::traffic::{Network, Sample};
 
 constants! {
     /// A truck swings out before its line: it has entered so far before the line of cars (2^-10 m).
@@ -66,6 +66,11 @@ impl View {
             middle,
             radius: now.iter().chain(&later).map(reach).fold(0.0, f32::max),
         }
+    }
+
+    /// Its speed along a sample of a car's path (2^-14 m a step).
+    pub(super) fn speed_along(&self, sample: &Sample) -> i32 {
+        speed(self.velocity.dot(sample.direction)).clamp(0, FASTEST)
     }
 
     /// Its way in two seconds (2^-10 m).

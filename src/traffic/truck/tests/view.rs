@@ -1,6 +1,8 @@
 //! A truck as cars see it.
 
 use super::*;
+use crate::traffic::Sample;
+use crate::traffic::model::FASTEST;
 use crate::traffic::truck::view::outlines;
 use crate::traffic::units::metres;
 
@@ -52,4 +54,16 @@ fn everything_that_a_truck_covers_now_and_later_lies_in_the_circle_around_it() {
             assert!(corner.distance(view.middle) <= view.radius);
         }
     }
+}
+
+#[test]
+fn a_truck_that_is_faster_than_any_car_is_followed_as_the_fastest_and_one_that_comes_toward_it_as_one_that_stands() {
+    let network = baked("20m");
+    let view = view_at(&network, 0, 30.0, 25.0);
+    let along = network.samples[network.paths[0].first as usize + 12];
+    assert!(0.9 < along.direction.dot(view.velocity) / 25.0);
+    assert_eq!(view.speed_along(&along), FASTEST);
+    assert_eq!(view.speed_along(&Sample { direction: -along.direction, ..along }), 0);
+    let slow = view_at(&network, 0, 30.0, 5.0);
+    assert!(slow.speed_along(&along).abs_diff(speed(5.0)) < speed(0.2) as u32);
 }
