@@ -147,16 +147,41 @@ impl Observer {
 
     /// Begins an episode at any place along the route, with the wheels straight and the truck's speed as its target, as
     /// the simulator begins one: the clock begins, what lies behind counts as passed, and the start is not judged.
-    /// Where a truck stands exactly at a waypoint, rounding decides whether that or the one after it is the next.
+    /// A route may pass a place twice, such as one that leads round a ring and back: then the nearer lane is taken, and
+    /// [`begin_near`](Observer::begin_near) says which is meant.
     ///
     /// # Errors
     ///
     /// [`Error::ImpossibleValue`] for a number that no pose can have; the observer is then as it was.
     pub fn begin(&mut self, pose: &Pose) -> Result<Observed, Error> {
+        self.begin_by(pose, None)
+    }
+
+    /// The same where it is known near which waypoint the truck is, by its index along the route: such as the one that
+    /// was the next of an episode that goes on. The next one is looked for at most 16 waypoints away.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`begin`](Observer::begin), and [`Error::OutsideWorld`] for a waypoint that the route does not have.
+    pub fn begin_near(&mut self, pose: &Pose, waypoint: u32) -> Result<Observed, Error> {
+        self.check_waypoint(waypoint)?;
+        self.begin_by(pose, Some(waypoint))
+    }
+
+    /// Whether the route has this waypoint, or one before it.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::OutsideWorld`] if not.
+    pub fn check_waypoint(&self, waypoint: u32) -> Result<(), Error> {
+        checked::waypoint(waypoint, self.world.routes[self.route as usize].n_waypoints)
+    }
+
+    fn begin_by(&mut self, pose: &Pose, known: Option<u32>) -> Result<Observed, Error> {
         let telemetry = Telemetry { target_speed: pose.speed, ..Telemetry::default() };
         let truck = self.placed(pose, &telemetry, 0)?;
         self.state = State::NEW;
-        Ok(self.seen(&truck, telemetry.target_speed))
+        Ok(self.seen(&truck, telemetry.target_speed, known))
     }
 
     /// The truck a step of the world later. The first pose of an observer begins an episode where it is. Allocates
@@ -168,7 +193,7 @@ impl Observer {
     pub fn observe(&mut self, pose: &Pose, telemetry: &Telemetry) -> Result<Observed, Error> {
         let steps = if self.state.waypoint.is_some() { self.state.steps.saturating_add(1) } else { 0 };
         let truck = self.placed(pose, telemetry, steps)?;
-        Ok(self.seen(&truck, telemetry.target_speed))
+        Ok(self.seen(&truck, telemetry.target_speed, None))
     }
 
     /// Whether a truck can have these numbers.
@@ -306,14 +331,14 @@ impl Observer {
         self.frame.angle(value.into()) as f32
     }
 
-    /// Observes and judges the truck, and goes on from there.
-    fn seen(&mut self, truck: &Truck, target_speed: f32) -> Observed {
+    /// Observes and judges the truck, and goes on from there; where an episode begins, near a known waypoint.
+    fn seen(&mut self, truck: &Truck, target_speed: f32, known: Option<u32>) -> Observed {
         let world = &*self.world;
         let params = &world.params;
         let (clearance, ranges) = (clearance_of(world, truck), ranges_of(world, truck));
         let waypoints = world.route_waypoints(truck.route);
         let point = reference_point(self.rig().wheelbase, truck);
-        let next = self.state.waypoint.unwrap_or_else(|| next_waypoint(waypoints, point, truck.heading));
+        let next = self.state.waypoint.unwrap_or_else(|| next_waypoint(waypoints, point, truck.heading, known));
         let mut progress = followed(waypoints, point, next, params.stray_distance);
         let route = &world.routes[truck.route as usize];
         let ended = match self.state {

@@ -179,7 +179,7 @@ class Observer:
         num_threads: int,
     ) -> Self: ...
     def begin_at(
-        self, trucks: list[int] | None, poses: npt.NDArray[np.float64]
+        self, trucks: list[int] | None, poses: npt.NDArray[np.float64], waypoints: list[int]
     ) -> tuple[
         npt.NDArray[np.float32],
         npt.NDArray[np.float32],

@@ -126,6 +126,8 @@ def numbers(name: str, value: npt.ArrayLike, needed: str) -> npt.NDArray[Any]:
         found = np.array([""])
     if found.dtype.kind not in "fiu":
         raise TypeError(f"{name}: {type(value).__name__}; {needed}")
+    if np.ma.is_masked(value):
+        raise ValueError(f"{name}: some are masked; {needed}, and none of them masked")
     return found
 
 

@@ -93,6 +93,8 @@ class Observer(_offtrack.Observer):
         if isinstance(routes, Set | Mapping):
             raise TypeError(f"routes: {routes!r}; a sequence is needed, one a truck or one for all")
         names = names_of(routes)
+        if not names:
+            raise ValueError("routes: empty; the name of each truck's route is needed, or of one for all")
         threads = 0 if num_threads is None else within("num_threads", num_threads, 1, 1025)
         pairs, rows = _vehicles(vehicles)
         stated: list[Any] | None = pairs if pairs is not None else rows
@@ -137,25 +139,37 @@ class Observer(_offtrack.Observer):
         trailer_heading: Numbers,
         speed: Numbers,
         *,
+        waypoint: int | Sequence[int] | None = None,
         trucks: Sequence[int] | None = None,
     ) -> Seen:
         """Begins an episode of each truck at any place along its route: what lies behind counts as passed.
 
         Wheels are straight and the target speed is the truck's, as where the simulator begins. The start is not judged.
+        Of a route that passes a place twice the nearer lane is taken, unless ``waypoint`` says which is meant.
 
         Args:
             position: Middle of the drive axle in the map's frame [m], ``[k, 2]``.
             heading: Heading of the tractor [rad], one number or ``[k]``, as all that follows.
             trailer_heading: Heading of the trailer [rad].
             speed: Speed of the drive axle along the tractor's heading [m/s].
+            waypoint: Index of a waypoint near which the trucks are, such as ``Seen.waypoint`` of an episode that goes
+                on, one or k of them: the next is looked for at most 16 waypoints away. None if it is not known.
             trucks: Indices of the k trucks that begin; None for all of them.
 
         Raises:
             TypeError: For what are no numbers.
-            ValueError: For another shape, and for a number that no truck has, such as NaN; no truck has begun then.
+            ValueError: For another shape, for a number that no truck has, such as NaN, and for a waypoint that a route
+                does not have; no truck has begun then.
         """
         rows = self._rows(trucks)
-        return Seen(*self.begin_at(rows, self._poses(rows, position, heading, trailer_heading, speed)))
+        poses = self._poses(rows, position, heading, trailer_heading, speed)
+        near: list[Any] = []
+        if waypoint is not None:
+            near = list(waypoint) if is_sequence(waypoint) else [waypoint] * len(poses)
+            if len(near) != len(poses):
+                raise ValueError(f"waypoint: {len(near)} of them; {len(poses)} or 1 are needed")
+            near = [within(f"waypoint[{row}]", index, 0, 2**32) for row, index in enumerate(near)]
+        return Seen(*self.begin_at(rows, poses, near))
 
     def observe(
         self,

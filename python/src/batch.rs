@@ -377,7 +377,7 @@ impl Batch {
 
     /// Lengths and limits of a vehicle by its index.
     fn dimensions_of<'py>(&self, py: Python<'py>, vehicle: usize) -> PyResult<Bound<'py, PyDict>> {
-        guarded(|| geometry::dimensions(py, &self.place.world.rigs[vehicle]))
+        guarded(|| geometry::dimensions(py, errors::at("vehicle", &self.place.world.rigs, vehicle)?))
     }
 
     /// Draws the routes of later episodes by other weights, of a batch that has some.

@@ -5,7 +5,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use offtrack::files::reader;
 use offtrack::simulator::Error;
 use pyo3::create_exception;
-use pyo3::exceptions::{PyMemoryError, PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyIndexError, PyMemoryError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
 create_exception!(
@@ -31,6 +31,12 @@ pub fn guarded<T>(work: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
 
 /// Most characters of a panic's message.
 const LONGEST_MESSAGE: usize = 600;
+
+/// The entry of a list with an index that the caller gave under some name.
+pub fn at<'a, T>(name: &str, list: &'a [T], index: usize) -> PyResult<&'a T> {
+    let outside = || PyIndexError::new_err(format!("{name}: {index}; there are 0..{}", list.len() - 1));
+    list.get(index).ok_or_else(outside)
+}
 
 /// An exception for a file that was refused. A name that is not known is a plain `ValueError`.
 pub fn of_reader(error: &reader::Error) -> PyErr {

@@ -120,14 +120,15 @@ impl Observer {
         actions::table(py, &self.place.world.actions)
     }
 
-    /// Begins an episode of each of these trucks at a pose, `[k, 5]`.
+    /// Begins an episode of each of these trucks at a pose, `[k, 5]`, near a waypoint, `[k]`, where that is known.
     fn begin_at<'py>(
         &self,
         py: Python<'py>,
         trucks: Option<Vec<usize>>,
         poses: PyReadonlyArray2<f64>,
+        waypoints: Vec<u32>,
     ) -> PyResult<Seen<'py>> {
-        guarded(|| self.look(py, trucks.as_deref(), poses, None))
+        guarded(|| self.look(py, trucks.as_deref(), poses, None, &waypoints))
     }
 
     /// Observes each of these trucks at a pose, `[k, 5]`, with its telemetry, `[k, 8]`.
@@ -138,7 +139,7 @@ impl Observer {
         poses: PyReadonlyArray2<f64>,
         telemetry: PyReadonlyArray2<f32>,
     ) -> PyResult<Seen<'py>> {
-        guarded(|| self.look(py, trucks.as_deref(), poses, Some(telemetry)))
+        guarded(|| self.look(py, trucks.as_deref(), poses, Some(telemetry), &[]))
     }
 
     /// Steer angle and target speed that each truck's action asks for, after its last target speed.
@@ -225,7 +226,7 @@ impl Observer {
 
     /// Lengths and limits of a truck by name.
     fn dimensions_of<'py>(&self, py: Python<'py>, truck: usize) -> PyResult<Bound<'py, PyDict>> {
-        guarded(|| geometry::dimensions(py, self.held()?.observers[truck].rig()))
+        guarded(|| geometry::dimensions(py, errors::at("truck", &self.held()?.observers, truck)?.rig()))
     }
 
     /// A number for all that the observers' benchmark is, see `Batch`.
@@ -279,12 +280,13 @@ impl Observer {
         trucks: Option<&[usize]>,
         poses: PyReadonlyArray2<f64>,
         telemetry: Option<PyReadonlyArray2<f32>>,
+        waypoints: &[u32],
     ) -> PyResult<Seen<'py>> {
         let (poses, telemetry) = (aligned(poses)?, telemetry.map(aligned).transpose()?);
         let poses: Vec<_> = poses.as_array().rows().into_iter().map(pose_of).collect();
         let telemetry: Vec<_> = telemetry
             .map_or_else(Vec::new, |telemetry| telemetry.as_array().rows().into_iter().map(telemetry_of).collect());
-        let rows = Rows { trucks, poses: &poses, telemetry: &telemetry };
+        let rows = Rows { trucks, poses: &poses, telemetry: &telemetry, waypoints };
         let mut held = self.held()?;
         let Held { observers, pool } = &mut *held;
         rows.check(observers)?;
@@ -311,6 +313,9 @@ fn restore(observers: &mut [observer::Observer], states: &[State]) -> PyResult<(
 /// The exception for a number of one of many trucks: its place has the truck's index first.
 fn of_truck(truck: usize, error: Error) -> PyErr {
     let indexed = |name: &str| match name.split_once('[') {
+        // Arguments of their own here.
+        Some(("load_transfer_ratios", "0]")) => format!("tractor_load_transfer_ratio[{truck}]"),
+        Some(("load_transfer_ratios", _)) => format!("trailer_load_transfer_ratio[{truck}]"),
         Some((array, rest)) => format!("{array}[{truck}, {rest}"),
         None => format!("{name}[{truck}]"),
     };

@@ -254,6 +254,8 @@ def test_wrong_outputs_and_requests_are_refused() -> None:
             batch.begin(**request)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="column: 'speed'|column: \"speed\"; must be one of action, control"):
         batch.columns("speed")
+    with pytest.raises(IndexError, match="vehicle: 5; there are 0..0"):
+        batch.dimensions_of(5)
     with pytest.raises(ValueError, match="env: 3; must lie in 0..2"):
         batch.render(3)
     with pytest.raises(ValueError, match="size: 10; must lie in 64..4096"):

@@ -161,7 +161,9 @@ def test_what_no_truck_can_have_is_refused_by_its_name_and_changes_nothing() -> 
         ({"position": [[0.0, 0.0], [0.0, 1e9]]}, ValueError, r"^position\[1, 1\]: 1000000000"),
         ({"trailer_heading": 1e9}, ValueError, r"^trailer_heading\[0\]: "),
         ({"steering": np.inf}, ValueError, r"^steering\[0\]: inf; "),
-        ({"trailer_load_transfer_ratio": [0.0, np.nan]}, ValueError, r"^load_transfer_ratios\[1, 1\]: NaN"),
+        ({"trailer_load_transfer_ratio": [0.0, np.nan]}, ValueError, r"^trailer_load_transfer_ratio\[1\]: NaN"),
+        ({"tractor_load_transfer_ratio": np.inf}, ValueError, r"^tractor_load_transfer_ratio\[0\]: inf"),
+        ({"heading": np.ma.array([0.0, 0.0], mask=[False, True])}, ValueError, "^heading: some are masked"),
         ({"position": np.zeros((3, 2))}, ValueError, r"^position: shape \(3, 2\); \(2, 2\) is needed"),
         ({"heading": np.broadcast_to(0.0, (2**40,))}, ValueError, r"^heading: shape \(1099511627776,\)"),
         ({"speed": "fast"}, TypeError, "^speed: str; numbers of shape"),
@@ -180,6 +182,33 @@ def test_what_no_truck_can_have_is_refused_by_its_name_and_changes_nothing() -> 
     assert observer.states() == before
     folded = observer.observe(**{**place, "trailer_heading": place["heading"] + np.radians(170.0)})
     assert np.isfinite(folded.values).all() and folded.ended.all()
+
+
+def test_a_waypoint_says_which_pass_of_a_place_is_meant() -> None:
+    route = "town03/N-left-1"
+    observer = Observer("maps2026", [route, route])
+    x, y, heading = observer.waypoints(route)[24]
+    back = 0.5 * observer.dimensions()["wheelbase"]
+    # Beside the lane, toward where the route comes back.
+    right = 0.8 * np.array([np.sin(heading), -np.cos(heading)])
+    position = np.array([x, y]) - back * np.array([np.cos(heading), np.sin(heading)]) + right
+    at = (np.tile(position, (2, 1)), heading, heading, 8.0)
+    assert (observer.begin(*at).waypoint > 80).all()
+    assert observer.begin(*at, waypoint=25).waypoint.tolist() == [25, 25]
+    mixed = observer.begin(*at, waypoint=[20, 90]).waypoint
+    assert mixed[0] == 25 and mixed[1] > 80
+    before = observer.states()
+    wrong: list[tuple[Any, str]] = [
+        (9999, "^waypoint"),
+        (-1, r"^waypoint\[0\]: -1; must lie in 0\.\."),
+        ([1], "^waypoint: 1 of them; 2 or 1 are needed"),
+    ]
+    for waypoint, message in wrong:
+        with pytest.raises(ValueError, match=message):
+            observer.begin(*at, waypoint=waypoint)
+    with pytest.raises(IndexError, match=r"truck: 2; there are 0\.\.1"):
+        observer.dimensions_of(2)
+    assert observer.states() == before
 
 
 def test_an_observer_of_unknown_routes_or_vehicles_is_refused_with_those_there_are() -> None:

@@ -54,11 +54,17 @@ pub(super) fn telemetry(telemetry: &Telemetry) -> Result<(), Error> {
 
 /// An error for a state that no observer of a route with so many waypoints has.
 pub(super) fn state(state: &State, n_waypoints: u32) -> Result<(), Error> {
-    if let Some(found) = state.waypoint.filter(|&waypoint| n_waypoints < waypoint) {
-        let limit = format!("{n_waypoints} waypoints on its route");
-        return Err(Error::OutsideWorld { column: "waypoint", env: 0, found, limit });
-    }
+    state.waypoint.map_or(Ok(()), |next| waypoint(next, n_waypoints))?;
     within(|| "speed_error_integral".to_owned(), state.speed_error_integral, -MOST..=MOST)
+}
+
+/// An error for a waypoint that a route with so many does not have; after the last all are passed.
+pub(super) fn waypoint(found: u32, n_waypoints: u32) -> Result<(), Error> {
+    if found <= n_waypoints {
+        return Ok(());
+    }
+    let limit = format!("{n_waypoints} waypoints on its route");
+    Err(Error::OutsideWorld { column: "waypoint", env: 0, found, limit })
 }
 
 /// An error for a speed or a target that no truck can have.

@@ -6,12 +6,21 @@ use crate::engine::cpu::follow::distance_to_segment;
 use crate::layout::WaypointRow;
 use crate::layout::angle::direction;
 
+/// A truck this little before the line through a waypoint stands on it, and has passed it, as the simulator begins (m).
+const ON_WAYPOINT: f32 = 2e-4;
+/// Waypoints before and behind a known one, among which the next is looked for.
+const AROUND: usize = 16;
+
 /// Index of the next waypoint of a truck whose reference point and heading these are: on the nearest segment of those
-/// that lead its way, or of all where none does, since a route comes back beside itself where a truck turns round.
-pub(super) fn next_waypoint(waypoints: &[WaypointRow], point: Vec2, heading: f32) -> u32 {
+/// that lead its way, or of all where none does, since a route comes back beside itself where a truck turns round. With
+/// a known waypoint only what is around that is looked at.
+pub(super) fn next_waypoint(waypoints: &[WaypointRow], point: Vec2, heading: f32, known: Option<u32>) -> u32 {
     let ahead = direction(heading);
     let (mut nearest, mut least) = (1, (true, f32::INFINITY));
     for (index, pair) in waypoints.windows(2).enumerate() {
+        if known.is_some_and(|known| AROUND < (known as usize).abs_diff(index + 1)) {
+            continue;
+        }
         let [from, to] = [pair[0].position, pair[1].position];
         let leads_away = (to - from).dot(ahead) <= 0.0;
         let candidate = (leads_away, distance_to_segment(point, from, to));
@@ -20,8 +29,10 @@ pub(super) fn next_waypoint(waypoints: &[WaypointRow], point: Vec2, heading: f32
         }
     }
     // In a bend the lines through the waypoints, which say what was passed, do not bound what is nearest to a segment.
-    while 1 < nearest && (point - waypoints[nearest - 1].position).dot(waypoints[nearest - 1].direction) < 0.0 {
+    let beyond = |waypoint: &WaypointRow| (point - waypoint.position).dot(waypoint.direction);
+    while 1 < nearest && beyond(&waypoints[nearest - 1]) < -ON_WAYPOINT {
         nearest -= 1;
     }
-    nearest as u32
+    let stands_on_it = waypoints.get(nearest).is_some_and(|waypoint| beyond(waypoint).abs() <= ON_WAYPOINT);
+    (nearest + usize::from(stands_on_it)) as u32
 }

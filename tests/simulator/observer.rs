@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec2;
 use offtrack::layout::{Control, Ended, Truck};
 use offtrack::observer::{Observed, Observer, Pose, State, Telemetry};
-use offtrack::scenario::Scenario;
+use offtrack::scenario::{Scenario, Split};
 use offtrack::simulator::{Batch, Error, RouteChoice, Simulator};
 use offtrack::world::World;
 
@@ -238,6 +238,45 @@ fn an_observer_goes_on_from_the_state_of_another_and_refuses_one_that_no_observe
     assert!(other.restore(&State { waypoint: Some(9_999), ..state }).is_err());
     assert!(other.restore(&State { speed_error_integral: f32::NAN, ..state }).is_err());
     assert_eq!(other.state(), state);
+}
+
+#[test]
+fn a_truck_where_a_route_passes_a_place_twice_begins_near_the_waypoint_that_is_known() {
+    let world = Arc::new(benchmark("maps2026").1);
+    let route = world.route_names.iter().position(|name| name == "town03/N-left-1").unwrap() as u32;
+    let mut observer = Observer::new(world, route, 0).unwrap();
+    // Beside the lane, toward where the route comes back.
+    let (point, heading) = observer.waypoints().nth(24).unwrap();
+    let (along, half) = (DVec2::from_angle(heading), 0.5 * f64::from(observer.rig().wheelbase));
+    let position = point - half * along - 0.8 * along.perp();
+    let pose = Pose { position, heading, trailer_heading: heading, speed: 8.0 };
+    let next = |seen: Result<Observed, Error>| seen.unwrap().progress.waypoint;
+    assert!(80 < next(observer.begin(&pose)));
+    for known in [24, 25, 12, 40] {
+        assert_eq!(next(observer.begin_near(&pose, known)), 25);
+    }
+    assert!(80 < next(observer.begin_near(&pose, 90)));
+    let before = observer.state();
+    let error = observer.begin_near(&pose, 9_999).unwrap_err().to_string();
+    assert!(error.contains("waypoint") && error.contains("9999"), "{error}");
+    assert_eq!(observer.state(), before);
+}
+
+#[test]
+fn a_truck_that_stands_on_a_waypoint_has_passed_it() {
+    let mut scenario = Scenario::named("random2026").unwrap();
+    scenario.start_along = 0.9;
+    let world = Arc::new(World::bake(&scenario).unwrap());
+    let choice = RouteChoice::Drawn(scenario.split(Split::Test).to_vec());
+    let simulator = Simulator::new(world.clone(), 2_000, 8, choice).unwrap();
+    let batch = simulator.batch();
+    let next = |(env, truck): (usize, &Truck)| {
+        let mut observer = Observer::new(world.clone(), truck.route, truck.vehicle).unwrap();
+        let seen = observer.begin(&pose(&observer, truck)).unwrap();
+        (seen.progress.waypoint, batch.progress[env].waypoint)
+    };
+    let others: Vec<_> = batch.truck.iter().enumerate().map(next).filter(|(seen, own)| seen != own).collect();
+    assert_eq!(others, []);
 }
 
 #[test]

@@ -28,6 +28,8 @@ pub(super) struct Rows<'a> {
     pub(super) trucks: Option<&'a [usize]>,
     pub(super) poses: &'a [Pose],
     pub(super) telemetry: &'a [Telemetry],
+    /// Waypoints that they begin near, where these are known.
+    pub(super) waypoints: &'a [u32],
 }
 
 impl Rows<'_> {
@@ -39,16 +41,20 @@ impl Rows<'_> {
     pub(super) fn check(&self, observers: &[Observer]) -> PyResult<()> {
         for (row, pose) in self.poses.iter().enumerate() {
             let telemetry = self.telemetry.get(row).copied().unwrap_or_default();
-            observers[self.truck(row)].check(pose, &telemetry).map_err(|error| of_truck(row, error))?;
+            let observer = &observers[self.truck(row)];
+            observer.check(pose, &telemetry).map_err(|error| of_truck(row, error))?;
+            let near = self.waypoints.get(row).map_or(Ok(()), |&waypoint| observer.check_waypoint(waypoint));
+            near.map_err(|error| of_truck(row, error))?;
         }
         Ok(())
     }
 
     /// What is observed, a row each.
     pub(super) fn observed(&self, observers: &mut [Observer]) -> Result<Vec<Observed>, Error> {
-        let observed = |observer: &mut Observer, row: usize| match self.telemetry.get(row) {
-            Some(telemetry) => observer.observe(&self.poses[row], telemetry),
-            None => observer.begin(&self.poses[row]),
+        let observed = |observer: &mut Observer, row: usize| match (self.telemetry.get(row), self.waypoints.get(row)) {
+            (Some(telemetry), _) => observer.observe(&self.poses[row], telemetry),
+            (None, Some(&waypoint)) => observer.begin_near(&self.poses[row], waypoint),
+            (None, None) => observer.begin(&self.poses[row]),
         };
         match self.trucks {
             Some(trucks) => {
