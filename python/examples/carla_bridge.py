@@ -177,7 +177,10 @@ def drive(args: argparse.Namespace) -> str:
     import offtrack_sim
 
     policy = offtrack_sim.Policy.shipped(args.policy)
-    observer = offtrack_sim.Observer(args.benchmark, routes=[args.route], vehicles=[(args.vehicle, args.load)])
+    # A benchmark with one vehicle does not name it.
+    has_one = ("", args.load) in offtrack_sim.Batch(args.benchmark, 1).classes
+    vehicle = ("" if has_one else args.vehicle, args.load)
+    observer = offtrack_sim.Observer(args.benchmark, routes=[args.route], vehicles=[vehicle])
     policy.check(observer)
     client = carla.Client(args.host, args.port)
     client.set_timeout(20.0)

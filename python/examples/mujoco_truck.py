@@ -251,21 +251,29 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="file to write the results to")
     parser.add_argument("--film", type=Path, help="GIF of the first episode beside the simulator's own")
     args = parser.parse_args()
+    if args.film and args.film.suffix != ".gif":
+        parser.error("--film: a name that ends in .gif is needed")
+    try:
+        for file in filter(None, (args.json, args.film)):
+            file.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        parser.error(str(error))
     if args.validate:
         rows = validate()
         if args.json:
             write_json(args.json, made_with() | {"checks": rows})
         return
-    if args.starts < 1 or not 0 <= args.delay <= 2 or not 0.05 <= args.mu <= 2:
-        parser.error("--starts: at least 1; --delay: 0..2; --mu: 0.05..2")
+    if args.starts < 1 or args.seed < 0 or not 0 <= args.delay <= 2 or not 0.05 <= args.mu <= 2:
+        parser.error("--starts: at least 1; --seed: at least 0; --delay: 0..2; --mu: 0.05..2")
     try:
         is_file = args.policy.endswith(".safetensors")
         policy = offtrack_sim.Policy.load(args.policy) if is_file else offtrack_sim.Policy.shipped(args.policy)
-        args.benchmark = args.benchmark or policy.benchmark
+        benchmark = args.benchmark or policy.benchmark
         named = None if args.routes == ["test"] else args.routes
-        args.names = offtrack_sim.Batch(args.benchmark, 1, split="test", routes=named).split_routes
+        args.names = offtrack_sim.Batch(benchmark, 1, split="test", routes=named).split_routes
     except ValueError as error:
-        raise SystemExit(str(error)) from None
+        raise SystemExit(f"{error}" if args.benchmark else f"{error}; --benchmark names another one") from None
+    args.benchmark = benchmark
     results: dict[str, dict[str, Any]] = {}
     for load in args.load:
         starts = Starts(args, load)

@@ -71,9 +71,8 @@ class Driver(Node):
         super().__init__("offtrack_driver")
         given = {name: str(self.declare_parameter(name, default).value) for name, default in PARAMETERS.items()}
         self.policy = offtrack_sim.Policy.shipped(given["policy"])
-        self.observer = offtrack_sim.Observer(
-            given["benchmark"], routes=[given["route"]], vehicles=[(given["vehicle"], given["load"])]
-        )
+        vehicle = vehicle_of(given["benchmark"], given["vehicle"], given["load"])
+        self.observer = offtrack_sim.Observer(given["benchmark"], routes=[given["route"]], vehicles=[vehicle])
         self.policy.check(self.observer)
         self.begun = False
         self.steering = self.speed = self.speed_before = 0.0
@@ -156,6 +155,9 @@ class Driver(Node):
 
     def brake(self) -> None:
         """Stops with the wheels as they are."""
+        # The policy is told what was asked for, and how the truck slowed since the last step.
+        self.target[:] = 0.0
+        self.speed_before = self.speed
         self.publish(self.steering, 0.0, -BRAKING)
 
     def publish(self, steering: float, speed: float, acceleration: float) -> None:
@@ -164,6 +166,11 @@ class Driver(Node):
         message.header.stamp, message.header.frame_id = self.get_clock().now().to_msg(), "base_link"
         message.drive.steering_angle, message.drive.speed, message.drive.acceleration = steering, speed, acceleration
         self.commands.publish(message)
+
+
+def vehicle_of(benchmark: str, vehicle: str, load: str) -> tuple[str, str]:
+    """Vehicle and load as a benchmark names them: one with a single vehicle does not name it."""
+    return ("", load) if ("", load) in offtrack_sim.Batch(benchmark, 1).classes else (vehicle, load)
 
 
 def yaw(rotation: Quaternion) -> float:

@@ -193,7 +193,11 @@ def _passed(reader: _Reader, node: Any) -> tuple[str, tuple[str, Any] | None]:
         raise TypeError(
             f"{_named(node)}: it rounds, or moves values among each other; a policy file has no place for it"
         )
-    if kind in SHAPES or kind == "ArgMax" or (kind == "Gather" and _is_one_step(reader.constant(node.input[1]))):
+    if kind in SHAPES or (kind == "Gather" and _is_one_step(reader, node)):
+        return node.input[0], None
+    if kind == "ArgMax":
+        if reader.attribute(node, "axis", 0) == 0 or reader.attribute(node, "select_last_index", 0):
+            raise TypeError(f"{_named(node)}: the first of the largest values of each row is needed, so the last axis")
         return node.input[0], None
     if kind in ("Relu", "Tanh"):
         return node.input[0], (kind, None)
@@ -236,9 +240,14 @@ def _changes_numbers(reader: _Reader, node: Any) -> bool:
     return False
 
 
-def _is_one_step(index: Any) -> bool:
-    """Whether a Gather takes the first or last of an axis, which is that of time: a policy sees one step at a time."""
-    return index is not None and np.ndim(index) == 0 and int(index) in (0, -1)
+def _is_one_step(reader: _Reader, node: Any) -> bool:
+    """Whether a Gather takes the first or last step of what a memory gives: a policy sees one step at a time."""
+    index = reader.constant(node.input[1])
+    before = reader.producers.get(node.input[0])
+    while before is not None and before.op_type in SHAPES:
+        before = reader.producers.get(before.input[0])
+    behind_memory = before is not None and before.op_type in ("GRU", "LSTM")
+    return behind_memory and index is not None and np.ndim(index) == 0 and int(index) in (0, -1)
 
 
 def _gemm(reader: _Reader, node: Any) -> Layer:

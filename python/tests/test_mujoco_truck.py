@@ -84,5 +84,9 @@ def test_a_truck_or_a_policy_that_is_not_there_is_refused_with_what_is(
         run(monkeypatch, "--policy", "attard2023", "--load", "empty", "--vehicle", "us_wb62", "--starts", "1")
     with pytest.raises(SystemExit, match="policy: none; the program comes with"):
         run(monkeypatch, "--policy", "none")
+    with pytest.raises(SystemExit, match="benchmark: distil_roads; .*; --benchmark names another one"):
+        run(monkeypatch, "--policy", "attard2023-lane", "--load", "empty")
+    with pytest.raises(SystemExit):
+        run(monkeypatch, "--film", "film.xyz")
     with pytest.raises(SystemExit, match="--load: daf_xf laden_worst; laden2026 has daf_xf empty, daf_xf half"):
         run(monkeypatch, "--load", "laden_worst")

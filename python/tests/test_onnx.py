@@ -152,6 +152,10 @@ def test_a_recurrent_graph_over_time_is_read_as_one_of_a_step(tmp_path: Path) ->
         ("MatMul", ["w", "x"], {}, "node 'y', MatMul: a policy file has no place for it"),
         ("Transpose", ["x"], {}, "it rounds, or moves values among each other"),
         ("Cast", ["x"], {"to": onnx.TensorProto.INT32}, "it rounds, or moves values among each other"),
+        ("Gather", ["x", "last"], {"axis": 1}, "node 'y', Gather: a policy file has no place for it"),
+        ("ArgMax", ["x"], {"axis": 0}, "of each row is needed, so the last axis"),
+        ("ArgMax", ["x"], {}, "of each row is needed, so the last axis"),
+        ("ArgMax", ["x"], {"axis": 1, "select_last_index": 1}, "the first of the largest values"),
     ],
 )
 def test_a_node_that_a_policy_file_has_no_place_for_is_refused_by_its_name(
@@ -160,7 +164,9 @@ def test_a_node_that_a_policy_file_has_no_place_for_is_refused_by_its_name(
     constants = {"w": np.ones((69, 9)), "b": np.ones(9), "h": np.ones((1, 1, 1))}
     constants |= {f"{part}{n}": np.ones((1, n, 69 if part == "w" else 1)) for n in (3, 4) for part in "wr"}
     file = tmp_path / "other.onnx"
-    onnx.save(graph(onnx.helper.make_node(kind, inputs, ["y"], **more), constants=constants), str(file))
+    model = graph(onnx.helper.make_node(kind, inputs, ["y"], **more), constants=constants)
+    model.graph.initializer.append(onnx.numpy_helper.from_array(np.array(-1, np.int64), "last"))
+    onnx.save(model, str(file))
     with pytest.raises(TypeError, match=message):
         export.from_onnx(file)
 

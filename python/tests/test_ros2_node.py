@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
 
 import offtrack_sim
@@ -114,6 +115,33 @@ def test_it_tells_the_policy_how_the_trailer_rolls(driver: Driver, monkeypatch: 
     assert [knows["trailer_roll"][0] for knows in told] == pytest.approx([0.02, 0.05])
     assert [knows["trailer_roll_rate"][0] for knows in told] == pytest.approx([0.2, 0.3])
     assert [knows["lateral_acceleration"][0] for knows in told] == pytest.approx([0.0, 0.0], abs=1e-9)
+
+
+def test_after_it_braked_it_tells_the_policy_what_it_asked_for(driver: Driver, monkeypatch: pytest.MonkeyPatch) -> None:
+    from rclpy.time import Time
+
+    told: list[dict[str, Any]] = []
+    observe = driver.observer.observe
+
+    def listened(*pose: Any, **knows: Any) -> offtrack_sim.observer.Seen:
+        told.append({name: float(np.ravel(value)[0]) for name, value in knows.items()})
+        return observe(*pose, **knows)
+
+    monkeypatch.setattr(driver.observer, "observe", listened)
+    stand(driver, 0.0, 0.0)
+    hear(driver, 8.0)
+    driver.step()
+    assert driver.target[0] > 2.0
+    # The poses stand still for a while, in which the truck brakes.
+    for tenth in range(1, 11):
+        driver.clock.time = Time(round(0.1 * tenth * 1e9))
+        hear(driver, 8.0 - 0.25 * tenth)
+        driver.step()
+    stand(driver, 6.0, 1.1)
+    hear(driver, 5.25)
+    driver.step()
+    assert told[-1]["target_speed"] == 0.0
+    assert told[-1]["acceleration"] == pytest.approx(-2.5)
 
 
 def test_a_quaternions_yaw_is_its_heading(driver: Driver) -> None:
