@@ -151,6 +151,13 @@ pub struct ReplayBuffer {
     pub priority: Option<Priority>,
 }
 
+impl ReplayBuffer {
+    /// Steps of all trucks that it holds: enough for its capacity.
+    pub fn slots(&self, n_envs: usize) -> usize {
+        self.capacity.div_ceil(n_envs)
+    }
+}
+
 /// Transitions are sampled in proportion to a power of their TD error.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

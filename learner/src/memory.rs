@@ -26,7 +26,7 @@ struct Part {
 
 /// Transitions that the replay buffer ever holds: no more than there are steps.
 pub fn transitions(config: &Config) -> usize {
-    let slots = config.replay_buffer.capacity.div_ceil(config.n_envs);
+    let slots = config.replay_buffer.slots(config.n_envs);
     let stepped = config
         .steps
         .map_or(usize::MAX, |steps| usize::try_from(steps.div_ceil(config.n_envs as u64)).unwrap_or(usize::MAX));

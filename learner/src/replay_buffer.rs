@@ -82,7 +82,7 @@ impl<const N: usize> ReplayBuffer<N> {
     /// A buffer for at least `settings.capacity` transitions of `n_envs` trucks, sampled over `n_steps` steps each.
     /// Memory is allocated as it is filled.
     pub fn new(n_envs: usize, n_steps: usize, settings: &config::ReplayBuffer) -> ReplayBuffer<N> {
-        let n_slots = settings.capacity.div_ceil(n_envs);
+        let n_slots = settings.slots(n_envs);
         ReplayBuffer {
             n_envs,
             n_slots,

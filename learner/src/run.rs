@@ -233,9 +233,10 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// The best policy by validation or, without one, the policy as it is; waits for a device.
+    /// The best policy by validation or, without one and in a refinement, the policy as it is; waits for a device.
     pub fn policy(&self) -> Result<Policy, Error> {
-        let best = self.validation.as_ref().and_then(Validation::best_policy);
+        let chooses = self.validation.as_ref().filter(|_| !self.training.is_refining());
+        let best = chooses.and_then(Validation::best_policy);
         let read =
             |bytes| Policy::from_bytes("best policy", bytes).expect("the bytes were made from a policy that drove");
         best.map_or_else(|| self.training.policy(), |bytes| Ok(read(bytes)))

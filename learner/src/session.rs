@@ -59,8 +59,8 @@ impl Session {
         let policy = policies::learned(from)?;
         policy.check(&self.world)?;
         if !policy.is_plain() {
-            let expected = "has a memory, values of its own or commands: the learner continues with a perceptron of \
-                            all values and an output an action alone";
+            let expected = "has a memory, several frames, values of its own or commands: the learner continues with a \
+                            perceptron of one observation's values and an output an action alone";
             return Err(Error::setting("from", from, expected.to_owned()));
         }
         if policy.vehicles != self.world.observes_vehicles() {

@@ -82,12 +82,12 @@ fn config(args: &Args, file: &Path) -> Result<Config, Error> {
     check_settings(args)?;
     let flags = Flags { seed: args.seed, minutes: args.minutes, steps: args.steps, envs: args.envs };
     let mut config = Config::read_for(file, args.benchmark.as_deref(), &args.settings, &flags)?;
+    config.from = args.from.clone().or(config.from);
     config.check_budget(&match (args.steps, args.envs) {
         (Some(steps), _) => PathBuf::from(format!("--steps {steps}")),
         (None, Some(envs)) => PathBuf::from(format!("{} with --envs {envs}", file.display())),
         (None, None) => Config::origin(file, args.benchmark.as_deref(), &args.settings, &flags),
     })?;
-    config.from = args.from.clone().or(config.from);
     if let Some(adapter) = &args.adapter {
         if config.device == config::Device::Cpu {
             let expected = "the training file uses the processor: leave it out, or add --set device=gpu".to_owned();

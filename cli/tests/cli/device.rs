@@ -308,6 +308,10 @@ mod on_a_device {
         succeed(&place.train(&["--set", "device=gpu"]));
         let report = place.json("runs/tiny-1/report.json");
         assert_eq!(report["env_steps"], 1600, "{report}");
+        // Its replay buffer would be full again after 400 more.
+        let more = ["train", "--resume", &place.text("runs/tiny-1"), "--steps", "2000"];
+        let said = refusal(&offtrack(&more), 2);
+        assert!(said.contains("--steps: 2000; must be above 2000, or nothing is learned: a device fills"), "{said}");
         let policy = place.text("runs/tiny-1/policy.safetensors");
         let json = place.text("report.json");
         succeed(&place.evaluate(&["--policy", &policy, "--episodes", "2", "--device", "gpu", "--json", &json]));

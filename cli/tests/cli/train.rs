@@ -246,10 +246,7 @@ fn a_run_that_begins_with_a_policy_keeps_it_until_the_actor_learns() {
         ),
         (vec!["--from", "attard2023"], "learned with another action table"),
         (vec!["--from", "nowhere.safetensors"], "nowhere.safetensors"),
-        (
-            vec!["--from", &frames],
-            "has a memory, values of its own or commands: the learner continues with a perceptron",
-        ),
+        (vec!["--from", &frames], "has a memory, several frames, values of its own or commands: the learner continues"),
         (vec!["--from", &tanh], "has the activation tanh: the learner continues with relu alone"),
     ] {
         let message = refusal(&place.train(&[&["--name", "refused"], &arguments[..]].concat()), 2);

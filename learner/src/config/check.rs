@@ -51,7 +51,7 @@ impl Config {
             refinement.check(reader)?;
         }
         // A ring of fewer slots than that would hold no step that enough others follow.
-        let slots = replay_buffer.capacity / self.n_envs;
+        let slots = replay_buffer.slots(self.n_envs);
         if slots <= learning.n_steps {
             let expected = format!(
                 "must hold more than learning.n_steps = {} steps of n_envs = {} trucks",
@@ -89,15 +89,24 @@ impl Config {
             );
             return Err(Reader::of(origin).invalid("steps", steps, expected).into());
         }
-        let (warmup, n_steps) = (self.replay_buffer.warmup, self.learning.n_steps + 1);
-        let before_updates = (warmup as u64).max(n_steps as u64 * self.n_envs as u64);
+        let before_updates = self.before_updates();
         let Some(steps) = self.steps.filter(|&steps| steps <= before_updates) else { return Ok(()) };
         let expected = format!(
-            "must be above {before_updates}, or nothing is learned: updates begin after replay_buffer.warmup = \
-            {warmup} env steps \
-             and learning.n_steps + 1 = {n_steps} steps of each truck"
+            "must be above {before_updates}, or nothing is learned: updates begin after replay_buffer.warmup = {} env \
+             steps and learning.n_steps + 1 = {} steps of each truck",
+            self.replay_buffer.warmup,
+            self.learning.n_steps + 1
         );
         Err(Reader::of(origin).invalid("steps", steps, expected).into())
+    }
+
+    /// Env steps before the first update: none of a refinement that begins with a policy, at once.
+    pub(crate) fn before_updates(&self) -> u64 {
+        if self.from.is_some() && self.refinement.as_ref().is_some_and(|refinement| refinement.begin <= 0.0) {
+            return 0;
+        }
+        let of_trucks = (self.learning.n_steps as u64 + 1) * self.n_envs as u64;
+        of_trucks.max(self.replay_buffer.warmup as u64)
     }
 }
 

@@ -329,6 +329,12 @@ fn a_budget_below_an_iteration_of_the_refinement_is_refused() {
             assert!(message.contains(&format!("own.toml: steps: {steps}; must be at least n_envs = ")), "{message}");
         }
     }
+    // One that begins at once with a policy fills no replay buffer first.
+    config.refinement.as_mut().unwrap().n_steps = 1;
+    (config.steps, config.from) = (Some(5_000), None);
+    assert!(config.check_budget(Path::new("own.toml")).is_err());
+    config.from = Some("a policy".to_owned());
+    assert_eq!(config.check_budget(Path::new("own.toml")).map_err(|error| error.to_string()), Ok(()));
 }
 
 #[test]

@@ -89,7 +89,7 @@ impl<const N: usize> DeviceRollout<N> {
         seeds: Seeds,
     ) -> Result<DeviceRollout<N>, Error> {
         let (n_envs, n_rows) = (config.n_envs, config.learning.batch);
-        let n_slots = config.replay_buffer.capacity.div_ceil(n_envs);
+        let n_slots = config.replay_buffer.slots(n_envs);
         check_capacity::<N>(gpu, config, n_slots * n_envs)?;
         let numbers = |width: usize| gpu.empty("sample", (n_rows * width) as u64 * NUMBER);
         let sample = Batch {

@@ -9,7 +9,7 @@ use super::folder::Folder;
 use super::metrics_file::MetricsFile;
 use super::progress;
 use crate::checkpoint::Stored;
-use crate::config::{Config, Flags};
+use crate::config::{Config, Device, Flags};
 use crate::error::Error;
 
 /// Most bytes of a report.
@@ -39,11 +39,13 @@ impl Resumed {
         // A report is written after the first checkpoint, when the run ends or is stopped.
         if !folder.checkpoint().is_file() && folder.report().is_file() {
             let ended = if is_evaluated(&folder) { "has finished" } else { "was stopped" };
-            let expected = format!(
-                "it {ended} and its checkpoint is gone: train --from {} begins a run with its policy",
-                folder.policy().display()
-            );
-            return Err(refused(path, expected));
+            let has_frames = config.refinement.as_ref().is_some_and(|refinement| 1 < refinement.frames);
+            // A run begins with the policy of one observation alone.
+            let instead = match has_frames {
+                true => "begin another run".to_owned(),
+                false => format!("train --from {} begins a run with its policy", folder.policy().display()),
+            };
+            return Err(refused(path, format!("it {ended} and its checkpoint is gone: {instead}")));
         }
         let file = folder.metrics();
         let metrics = if file.is_file() { MetricsFile::open(file)? } else { MetricsFile::create(file)? };
@@ -69,6 +71,16 @@ impl Resumed {
             let expected =
                 format!("it was trained for {:.2} min and {env_steps} env steps: more are needed", seconds / 60.0);
             return Err(refused(path, expected));
+        }
+        let refilled = env_steps.saturating_add(config.before_updates());
+        if config.device == Device::Gpu
+            && let Some(steps) = config.steps.filter(|&steps| env_steps < steps && steps <= refilled)
+            && has_new_budget
+        {
+            let expected = format!(
+                "must be above {refilled}, or nothing is learned: a device fills its replay buffer again first"
+            );
+            return Err(Error::setting("--steps", steps.to_string(), expected));
         }
         if over && is_evaluated {
             let expected =
