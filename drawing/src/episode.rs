@@ -266,6 +266,7 @@ impl<'a> Scene<'a> {
             "random" => "random actions",
             "yields" => "rule that follows and yields",
             "follows" => "rule that follows",
+            under_rule if under_rule.starts_with("yields:") => "learned policy under the rule",
             _ => "learned policy",
         }
     }

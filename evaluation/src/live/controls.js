@@ -158,10 +158,11 @@ function listenToKeys(app) {
     t: () => app.visit.toggleWheel(), Escape: () => app.visit.escape(), f: () => app.visit.latestFailure(),
   };
   document.addEventListener("keydown", (event) => {
-    const { tagName } = event.target;
+    const { tagName, type } = event.target;
     if (event.ctrlKey || event.metaKey || event.altKey || byId("keys").open) return;
     // Controls with keys of their own keep them.
-    if (tagName === "INPUT" || tagName === "SELECT") return;
+    if ((tagName === "INPUT" && type !== "checkbox") || tagName === "SELECT") return;
+    if (event.key === " " && type === "checkbox") return;
     if ((event.key === " " || event.key === "Enter") && (tagName === "BUTTON" || tagName === "SUMMARY")) return;
     const key = event.key === "=" ? "+" : event.key.length === 1 ? event.key.toLowerCase() : event.key;
     if (app.visit.driving.key(event.key, true)) event.preventDefault();

@@ -79,8 +79,9 @@ class Crowd {
   add(row) {
     const before = this.steps.at(-1);
     if (before && before.episode !== row.truck.episode) this.steps = [];
-    const points = [...row.truck.position, ...this.trailerOf(row.truck)];
-    this.steps.push({ row, episode: row.truck.episode, points });
+    const { position, heading, episode } = row.truck, trailer = this.trailerOf(row.truck), { wheelbase } = this.rigOf(row.truck);
+    const front = [Math.cos, Math.sin].map((along, axis) => position[axis] + wheelbase * along(heading));
+    this.steps.push({ row, episode, points: [...position, ...trailer], front, trailer });
     this.steps.at(-1).offTracking = offTrackingAt(this.steps);
     if (MOST_STEPS < this.steps.length) this.steps.shift();
   }
@@ -158,11 +159,12 @@ class Crowd {
   }
 }
 
-/** How far the trailer's axles are from the path of the tractor's drive axle, over the steps so far (m). */
+/** How far the trailer's axles are from the path of the tractor's front axle, over the steps so far (m); null until
+ * they have come to where it begins. */
 function offTrackingAt(steps) {
-  const [, , x, y] = steps.at(-1).points;
+  const [x, y] = steps.at(-1).trailer;
   // A trailer follows some 15 m behind at most: the last steps hold its way.
-  const path = steps.slice(-120).map(({ points }) => points);
+  const path = steps.slice(-120).map(({ front }) => front);
   let least = Infinity, isStart = false;
   for (let n = 1; n < path.length; n++) {
     const [ax, ay] = path[n - 1], [bx, by] = path[n], [dx, dy] = [bx - ax, by - ay];
@@ -170,6 +172,5 @@ function offTrackingAt(steps) {
     const away = Math.hypot(ax + at * dx - x, ay + at * dy - y);
     if (away < least) [least, isStart] = [away, n === 1 && at === 0];
   }
-  // Until the trailer has come to where the path begins there is none beside it.
-  return isStart || least === Infinity ? 0 : least;
+  return isStart || least === Infinity ? null : least;
 }

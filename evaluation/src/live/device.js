@@ -153,3 +153,18 @@ class Gpu {
     return parts.map(([, , size]) => all.slice(at, (at += size)));
   }
 }
+
+/** Why the page cannot run, by the kind of a `NoDevice`, and what would do. */
+const MISSING = {
+  webgpu: ["This page needs WebGPU", "Browsers that have it: Chrome and Edge from version 113 on (on Linux from 144 " +
+    "on, with some graphics cards), Safari from 26 on, Firefox from 141 on Windows and from 145 on macOS."],
+  adapter: ["No graphics adapter was found", "Turn on graphics acceleration in the browser's settings, update the " +
+    "graphics driver, or try another browser: Chrome, Edge, Safari and Firefox of today have WebGPU."],
+  device: ["The graphics adapter does not open", "Close other pages that use it, or start the browser again."],
+  lost: ["The graphics device was lost", "The driver was reset, or the computer slept. Nothing is damaged."],
+  failed: ["The graphics device reported an error", "The page stopped. Fewer trucks may do."],
+};
+
+/** Whether a device is a program on the processor: it has no speed for thousands of trucks. */
+const isSoftware = ({ name, adapter }) =>
+  adapter.info?.isFallbackAdapter || /swiftshader|llvmpipe|software/i.test(name);

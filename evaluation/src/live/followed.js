@@ -12,7 +12,9 @@ const LIVE_READINGS = [
   ["Off-tracking", ({ offTracking }) => offTracking, metres],
   ["Steering", ({ row }, side) => side * toDegrees(row.truck.steering), turnWords],
   ["Articulation", ({ row }, side) => side * toDegrees(articulationOf(row)), (value) => degrees(value, 1)],
-  ["Nearest kerb", ({ row }) => Math.min(row.clearance.tractor, row.clearance.trailer), metres],
+  // At its start a truck is not judged: the clearance is still that of the episode before.
+  ["Nearest kerb", ({ row }) => (row.truck.steps === 0 ? null : Math.min(row.clearance.tractor, row.clearance.trailer)),
+    metres],
   ["Lane's centre", ({ row }) => row.progress.lane_distance, metres],
 ];
 /** Points of a small curve, and pictures of the panel a second. */
@@ -69,7 +71,8 @@ class Followed {
       const node = byId("readings").children[index], values = thinned(steps.map((step) => value(step, side)), MOST_SPARKS);
       if (values.length === 0) return;
       node.querySelector("dd").textContent = words(values.at(-1));
-      node.querySelector("svg").replaceWith(sparkline(values));
+      const known = values.filter((value) => value !== null);
+      node.querySelector("svg").replaceWith(sparkline(known.length === 0 ? [0, 0] : known));
     });
     const around = world.facts.traffic?.observed ? row.around : [];
     const seen = [...row.observation, ...[...row.extras].slice(0, world.facts.extras.length), ...around];

@@ -61,7 +61,9 @@ function showEnds(live, crowds, reported) {
   const [{ batch: { begun, n } }] = crowds;
   const out = begun < n ? `${whole(begun)} of ${whole(n)} trucks have set out. ` : "";
   const ended = counted.map(({ episodes }) => whole(episodes)).join(" and ");
-  byId("ends-note").textContent = `${out}Episodes that have ended: ${ended}.`;
+  const yours = crowds.reduce((sum, { driven }) => sum + driven.size, 0);
+  const byYou = yours === 0 ? "" : ` You drove in ${whole(yours)}, which count here and in the success.`;
+  byId("ends-note").textContent = `${out}Episodes that have ended: ${ended}.${byYou}`;
 }
 
 /** Shows failures, each a button that calls `open`. The list is made anew only where it has changed. */

@@ -16,6 +16,7 @@ class Pairs {
       return html("option", { value: index }, words);
     }));
     this.listen();
+    showSceneKeys(page);
     this.open(0);
   }
 

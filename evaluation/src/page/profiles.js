@@ -106,8 +106,8 @@ function showProfiles(page, replay) {
     loads = loadLines(page, profiles, all ? null : replay.episode.route);
     const name = page.ground.routes[replay.episode.route].name, n = loads.reduce((sum, { count }) => sum + count, 0);
     byId("profiles-note").textContent = all
-      ? `${whole(n)} episodes that arrived, on the ${whole(page.ground.routes.length)} routes of the replay.`
-      : `${whole(n)} episodes that arrived on ${name}, the route open in the replay.`;
+      ? `${whole(n)} ${n === 1 ? "episode" : "episodes"} that arrived, on the ${whole(page.ground.routes.length)} routes of the replay.`
+      : `${whole(n)} ${n === 1 ? "episode" : "episodes"} that arrived on ${name}, the route open in the replay.`;
     byId("profiles-legend").replaceChildren(...loads.map(({ load, colour, count }) =>
       html("li", {}, html("i", { class: "thin", style: `--swatch: ${colour}` }), `${load}: ${whole(count)} ${count === 1 ? "episode" : "episodes"}`)));
     draw();

@@ -186,8 +186,6 @@ class Replay {
     window.addEventListener("hashchange", () => this.openLink());
     window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.show());
     new ResizeObserver(() => this.show()).observe(this.canvas);
-    const legend = [["kerb", "kerb"], ["route", "route's lane centre"], ["tractor", "tractor, path of its drive axle"], ["trailer", "trailer, path of its axles"], ["ray", "distance sensors"]];
-    if (this.page.others !== null) legend.push(["car", "car"], ["van", "van or larger"], ["brakes", "brakes"], ["rude", "edge of who is rude"]);
-    byId("scene-legend").replaceChildren(...lineKeys(legend));
+    showSceneKeys(this.page);
   }
 }

@@ -28,6 +28,14 @@ function sceneOf(page, episode) {
   };
 }
 
+/** Shows what the colours of a scene mean. */
+function showSceneKeys({ others }) {
+  const keys = [["kerb", "kerb"], ["route", "route's lane centre"], ["tractor", "tractor, path of its drive axle"],
+    ["trailer", "trailer, path of its axles"], ["ray", "distance sensors"]];
+  const ofVehicles = [["car", "car"], ["van", "van or larger"], ["brakes", "brakes"], ["rude", "edge of who is rude"]];
+  byId("scene-legend").replaceChildren(...lineKeys(others === null ? keys : [...keys, ...ofVehicles]));
+}
+
 /** Middle [m] and scale [pixels a metre] of the view. */
 function viewOf(scene, now, width, height, follow) {
   if (follow) return { x: (now.x + now.trailerX) / 2, y: (now.y + now.trailerY) / 2, scale: Math.min(width, height) / CLOSE_UP };
