@@ -174,7 +174,7 @@ impl<'a> Sweep<'a> {
             }
         });
         match self.apron_clearance.filter(|clearance| *clearance < 0.0) {
-            Some(clearance) => format!("{tractor}, {trailer}, {:.2} m on an apron", -clearance),
+            Some(clearance) => format!("{tractor}, {trailer}, {:.2} m past an apron edge", -clearance),
             None => format!("{tractor}, {trailer}"),
         }
     }

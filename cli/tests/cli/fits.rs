@@ -306,7 +306,7 @@ fn where_a_trailer_needs_the_apron_table_files_sheet_and_picture_say_so() {
     assert!(json["assumptions"].to_string().contains("trailers may drive on aprons"), "{json}");
     assert!(text(&place, "fits.csv").lines().next().unwrap().contains("lane_centre_apron_clearance"));
     let svg = text(&place, "apron.svg");
-    assert!(svg.contains("m on the apron") && svg.contains("apron, for trailers alone"), "{}", svg.len());
+    assert!(svg.contains("m past the apron edge") && svg.contains("apron, for trailers alone"), "{}", svg.len());
     assert!(svg.contains("url(#trailer_solids)") && svg.contains("id=\"trailer_solids\""));
     assert!(text(&place, "apron-eu_4x2_13m6.dxf").contains("\nAPRON\n"));
     assert!(text(&place, "apron-eu_4x2_13m6.geojson").contains("\"part\":\"apron\""));
@@ -314,7 +314,7 @@ fn where_a_trailer_needs_the_apron_table_files_sheet_and_picture_say_so() {
     let draw = program().args(draw).args(case).output().unwrap();
     succeed(&draw);
     let said = String::from_utf8(draw.stdout).unwrap();
-    assert!(said.contains("its own lane suffices") && said.contains(" m on an apron"), "{said}");
+    assert!(said.contains("its own lane suffices") && said.contains(" m past an apron edge"), "{said}");
     let drawn = place.json("road.json");
     assert_eq!(drawn["aprons"][0].as_array().unwrap().len(), 2);
     assert!(drawn["sweep"]["apron_clearance"].as_f64().unwrap() < -0.1, "{}", drawn["sweep"]);

@@ -38,8 +38,10 @@ const RING: f64 = 0.6;
 /// import` reads them.
 pub fn dxf(road: &Road, gutter: Gutter, shown: &[&Shown]) -> String {
     let mut drawing = Drawing { text: String::new(), origin: road.ground().origin };
-    let names: Vec<String> =
-        shown.iter().enumerate().map(|(index, one)| layer_name(one.row.movement(), index)).collect();
+    let mut names: Vec<String> = Vec::new();
+    for (index, one) in shown.iter().enumerate() {
+        names.push(own_layer(&names, one.row.movement(), index));
+    }
     drawing.pair(999, "offtrack fits: lengths in metres");
     for (code, value) in [(0, "SECTION"), (2, "HEADER"), (9, "$ACADVER"), (1, "AC1009"), (0, "ENDSEC")] {
         drawing.pair(code, value);
@@ -64,11 +66,21 @@ pub fn dxf(road: &Road, gutter: Gutter, shown: &[&Shown]) -> String {
     drawing.text
 }
 
+/// A route's name as a part of a layer's, unless another has it: layers know no lower case, names of arms do.
+fn own_layer(others: &[String], movement: &str, index: usize) -> String {
+    let name = layer_name(movement, index);
+    if others.contains(&name) { numbered(index) } else { name }
+}
+
 /// A route's name as a part of a layer's.
 fn layer_name(movement: &str, index: usize) -> String {
     let name = movement.to_ascii_uppercase();
     let is_usual = name.len() <= LONGEST && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_');
-    if is_usual { name } else { format!("ROUTE-{}", index + 1) }
+    if is_usual { name } else { numbered(index) }
+}
+
+fn numbered(index: usize) -> String {
+    format!("ROUTE-{}", index + 1)
 }
 
 struct Drawing {
@@ -284,6 +296,11 @@ mod tests {
         for name in ["a-very-long-arm-name-left-3", "Nörd-left-1"] {
             assert_eq!(layer_name(name, 4), "ROUTE-5");
         }
+        let mut names = Vec::new();
+        for (index, name) in ["N-left-1", "n-left-1", "E-left-1"].into_iter().enumerate() {
+            names.push(own_layer(&names, name, index));
+        }
+        assert_eq!(names, ["N-LEFT-1", "ROUTE-2", "E-LEFT-1"]);
         let longest = PARTS.iter().map(|(part, _)| part.len()).max().unwrap();
         assert_eq!(LONGEST + 1 + longest, 31);
     }

@@ -109,7 +109,7 @@ impl Shown {
         let shown = self.row.shown();
         let apron = match shown.apron_use() {
             Some(0.0) => ", apron not used".to_owned(),
-            Some(by) => format!(", {} on the apron", said(units, by)),
+            Some(by) => format!(", {} past the apron edge", said(units, by)),
             None => String::new(),
         };
         let verdict = self.row.verdict();
