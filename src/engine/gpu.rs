@@ -109,8 +109,24 @@ impl Device {
         }
     }
 
-    /// The bytes of some slices, after all work submitted before.
+    /// The bytes of some slices, after all work submitted before. What does not fit into one buffer is read in parts.
     pub fn read(&self, slices: &[Slice]) -> Result<Vec<Vec<u8>>, Error> {
+        let largest = self.device.limits().max_buffer_size;
+        let mut contents = Vec::with_capacity(slices.len());
+        while contents.len() < slices.len() {
+            let rest = &slices[contents.len()..];
+            let sums = rest.iter().scan(0u64, |sum, slice| {
+                *sum += slice.size;
+                Some(*sum)
+            });
+            let n = sums.take_while(|&sum| sum <= largest).count().max(1);
+            contents.extend(self.read_at_once(&rest[..n])?);
+        }
+        Ok(contents)
+    }
+
+    /// The bytes of slices that fit into one buffer.
+    fn read_at_once(&self, slices: &[Slice]) -> Result<Vec<Vec<u8>>, Error> {
         self.check()?;
         let size = slices.iter().map(|slice| slice.size).sum();
         let usage = BufferUsages::MAP_READ | BufferUsages::COPY_DST;

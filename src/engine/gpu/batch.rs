@@ -48,16 +48,12 @@ impl Batch {
         let host = engine::Batch::new(n_envs, seed, choice, has_vehicles, world.group())?;
         let buffers = Buffers::new(device, world, &host, &columns)?;
         let case = Case::of(world, host.autoreset());
-        let room = Mutex::new(Some(host));
-        Ok(Batch {
-            device: device.clone(),
-            n_envs,
-            buffers,
-            case,
-            external: !columns.is_empty(),
-            seen: OnceLock::new(),
-            room,
-        })
+        Ok(Batch::of(device, buffers, case, host, !columns.is_empty()))
+    }
+
+    fn of(device: &Device, buffers: Buffers, case: Case, host: engine::Batch, external: bool) -> Batch {
+        let (device, n_envs, room) = (device.clone(), host.n_envs(), Mutex::new(Some(host)));
+        Batch { device, n_envs, buffers, case, external, seen: OnceLock::new(), room }
     }
 
     /// The device that the batch lives on.
@@ -180,7 +176,12 @@ impl EngineBatch for Batch {
 
     fn streams(&self) -> Vec<Stream> {
         let room = self.room.lock().unwrap_or_else(PoisonError::into_inner);
-        self.seen.get().or(room.as_ref()).map(|batch| batch.streams().to_vec()).unwrap_or_default()
+        if let Some(batch) = self.seen.get().or(room.as_ref()) {
+            return batch.streams().to_vec();
+        }
+        // Another thread is reading the columns.
+        drop(room);
+        self.columns().streams().to_vec()
     }
 
     fn begin(&mut self, _: &World, begins: &[BeginRow], streams: Option<&[Stream]>) -> Result<(), engine::Error> {
@@ -216,9 +217,10 @@ impl EngineBatch for Batch {
             return Err(Error::ExternalColumns.into());
         }
         let host = self.columns().gathered(indices)?;
-        let mut batch =
-            Batch::new(&self.device, world, indices.len(), host.seed(), host.choice().clone(), Columns::new())?;
-        batch.set_autoreset(host.autoreset());
+        check_size(&self.device, indices.len(), world.traffic.is_some())?;
+        let buffers = self.buffers.resized(&self.device, world, &host)?;
+        let room = engine::Batch::clone(&host);
+        let mut batch = Batch::of(&self.device, buffers, self.case, room, false);
         batch.upload(&host);
         *self = batch;
         Ok(())

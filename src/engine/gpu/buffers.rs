@@ -45,17 +45,33 @@ impl Buffers {
         batch: &engine::Batch,
         external: &Columns,
     ) -> Result<Buffers, Error> {
+        let tables = Tables::new(world);
+        let of_world = |table: Table| tables.bytes(table).map(|bytes| device.filled(table.name(), bytes));
+        Buffers::around(device, world, batch, external, of_world)
+    }
+
+    /// Those of another batch in the same world, whose tables they share.
+    pub(super) fn resized(&self, device: &Device, world: &World, batch: &engine::Batch) -> Result<Buffers, Error> {
+        Buffers::around(device, world, batch, &Columns::new(), |table| Some(self.table(table).clone()))
+    }
+
+    /// The buffers of a batch beside the world's tables.
+    fn around(
+        device: &Device,
+        world: &World,
+        batch: &engine::Batch,
+        external: &Columns,
+        of_world: impl Fn(Table) -> Option<Slice>,
+    ) -> Result<Buffers, Error> {
         let n_envs = batch.n_envs();
         let has_vehicles = world.traffic.is_some();
-        let tables = Tables::new(world);
+        let begins = (n_envs * size_of::<BeginRow>()) as u64;
         let made = BUFFERS.into_iter().map(|buffer| match buffer {
             Shared::Table(Table::Batch) => Ok(device.filled(buffer.name(), bytes_of(&BatchFacts::of(batch)))),
             Shared::Table(Table::Choice) => Ok(device.filled(buffer.name(), cast_slice(batch.choice().routes()))),
             Shared::Table(Table::Streams) => Ok(device.filled(buffer.name(), cast_slice(batch.streams()))),
-            Shared::Table(table) => Ok(match tables.bytes(table) {
-                Some(bytes) => device.filled(table.name(), bytes),
-                None => device.empty(table.name(), (n_envs * size_of::<BeginRow>()) as u64),
-            }),
+            Shared::Table(Table::Begins) => Ok(device.empty(buffer.name(), begins)),
+            Shared::Table(table) => Ok(of_world(table).unwrap_or_else(|| device.empty(table.name(), begins))),
             Shared::Column(column) => {
                 let n_rows = column.n_rows(n_envs, has_vehicles);
                 column_slice(device, column, n_rows, external)
