@@ -203,9 +203,7 @@ impl Sample {
     fn new(road: &RoadRecord, section: &Section, s: f64) -> Sample {
         let (p, heading) = road.pose(s);
         let across = DVec2::from_angle(heading).perp();
-        let offset = active(&road.offsets, s, |offset| offset.start)
-            .filter(|offset| offset.start <= s)
-            .map_or(0.0, |offset| offset.at(s));
+        let offset = road.offset_at(s);
         let offset = if offset.is_finite() { offset.clamp(-FARTHEST, FARTHEST) } else { 0.0 };
         let local = s - section.start;
         let mut edges = vec![[p; 2]; section.lanes.len()];

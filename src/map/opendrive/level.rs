@@ -136,7 +136,7 @@ impl Source<'_, '_> {
 /// How far a road's lanes reach to its right and to its left at a station, left positive (m).
 fn reach(road: &RoadRecord, s: f64) -> [f64; 2] {
     let Some(section) = active(&road.sections, s, |section| section.start) else { return [0.0; 2] };
-    let offset = active(&road.offsets, s, |offset| offset.start).map_or(0.0, |offset| offset.at(s));
+    let offset = road.offset_at(s);
     let local = s - section.start;
     let width = |side: i32| -> f64 {
         let lanes = section.lanes.iter().filter(|lane| lane.id.signum() == side);

@@ -12,6 +12,8 @@ use crate::map::route::Lane;
 const JUMP: f64 = 0.1;
 /// A centre line that is nearer to a kerb than half a truck's width is warned of (m).
 const NEAREST: f64 = 1.3;
+/// Distance between the points of a line that are compared with kerbs (m).
+const STEP: f64 = 0.98;
 
 /// Reach of crossing lines to either side of a lane that is in no ring, in widths of the lane: over its neighbours too.
 pub(super) const CROSSING: f64 = 1.5;
@@ -99,30 +101,57 @@ fn width(network: &Network, way: &[usize], p: DVec2) -> f64 {
 
 /// Where a line comes too near to a kerb, away from its ends, and how near it is there (m).
 pub(in crate::map) fn closest(line: &Curve, faces: &Outline) -> Option<(f64, DVec2)> {
-    let n = (line.length() - 2.0 * NEAREST) as usize;
-    let at = |i: usize| line.point_at(2.0 * NEAREST + i as f64 * 0.98);
-    let all = (0..n).map(|i| (faces.signed_distance(at(i)), at(i)));
+    // Conversions saturate: a short line is all ends.
+    let n = ((line.length() - 4.0 * NEAREST) / STEP) as usize;
+    let at = |i: usize| line.point_at(2.0 * NEAREST + i as f64 * STEP);
+    let all = (0..=n).map(|i| (faces.signed_distance(at(i)), at(i)));
     all.min_by(|one, other| one.0.total_cmp(&other.0)).filter(|(distance, _)| *distance < NEAREST)
 }
 
 /// The centre lines of routes, each lane once.
 pub(super) fn shown(lines: &[Line]) -> Vec<Curve> {
-    const STEP: f64 = 0.5;
+    const SPACING: f64 = 0.5;
     const SAME: f64 = 0.3;
     let mut shown: Vec<Curve> = Vec::new();
     for Line { line, .. } in lines {
-        let n = (line.length() / STEP) as usize;
-        let known: Vec<bool> =
-            (0..=n).map(|i| shown.iter().any(|other| other.distance(line.point_at(i as f64 * STEP)) < SAME)).collect();
+        let n = (line.length() / SPACING) as usize;
+        let known: Vec<bool> = (0..=n)
+            .map(|i| shown.iter().any(|other| other.distance(line.point_at(i as f64 * SPACING)) < SAME))
+            .collect();
         let mut from = 0;
         while from <= n {
             let to = (from..=n).find(|&i| known[i] != known[from]).unwrap_or(n + 1);
             if !known[from] && 2 < to - from {
-                let end = if to <= n { to as f64 * STEP } else { line.length() };
-                shown.push(line.part(from as f64 * STEP, end));
+                let end = if to <= n { to as f64 * SPACING } else { line.length() };
+                shown.push(line.part(from as f64 * SPACING, end));
             }
             from = to;
         }
     }
     shown
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Piece;
+
+    #[test]
+    fn a_kerb_is_found_wherever_it_is_along_a_line_of_any_length() {
+        let rectangle = |from: DVec2, to: DVec2| {
+            let corners = [from, DVec2::new(to.x, from.y), to, DVec2::new(from.x, to.y)];
+            let side = |i: usize| Piece::Segment { from: corners[i], to: corners[(i + 1) % 4] };
+            Curve { pieces: (0..4).map(side).collect() }
+        };
+        for length in [20.0, 200.0, 1_000.0] {
+            let line = Curve { pieces: vec![Piece::Segment { from: DVec2::ZERO, to: DVec2::new(length, 0.0) }] };
+            let road = rectangle(DVec2::new(-9.0, -9.0), DVec2::new(length + 9.0, 9.0));
+            assert_eq!(closest(&line, &Outline::new(vec![road.clone()])), None);
+            for at in [3.0, 0.5 * length, length - 3.0] {
+                let post = rectangle(DVec2::new(at - 0.5, 0.6), DVec2::new(at + 0.5, 1.0));
+                let (distance, place) = closest(&line, &Outline::new(vec![road.clone(), post])).unwrap();
+                assert!(distance < NEAREST && (place.x - at).abs() < 1.5, "{length} {at}: {distance} {place}");
+            }
+        }
+    }
 }

@@ -174,6 +174,12 @@ pub(super) struct RoadRecord {
 }
 
 impl RoadRecord {
+    /// How far the lanes are moved to the left of the reference line at a station: not before the first record (m).
+    pub(super) fn offset_at(&self, s: f64) -> f64 {
+        let before = active(&self.offsets, s, |offset| offset.start).filter(|offset| offset.start <= s);
+        before.map_or(0.0, |offset| offset.at(s))
+    }
+
     /// Height of the reference line at a station (m).
     pub(super) fn height(&self, s: f64) -> f64 {
         active(&self.level.elevation, s, |elevation| elevation.start).map_or(0.0, |elevation| elevation.at(s))
