@@ -239,14 +239,17 @@ impl Vehicle {
         on_fifth_wheel / (self.tractor.mass + on_fifth_wheel)
     }
 
-    /// Radius of the circle inside the trailer's axle group when the tractor's outer front corner runs on a circle of
-    /// radius `outer` (m); `None` if the combination cannot turn so tightly. Directive 96/53/EC requires 5.30 m at
-    /// 12.50 m.
+    /// Radius of the circle inside the trailer's axle group when the outermost of both units' front corners runs on a
+    /// circle of radius `outer` (m); `None` if the combination cannot turn so tightly. Directive 96/53/EC requires
+    /// 5.30 m at 12.50 m.
     pub fn turning_circle_inner_radius(&self, outer: f64) -> Option<f64> {
         let Tractor { wheelbase, front_overhang, width, .. } = self.tractor;
-        let corner = outer.powi(2) - (wheelbase + front_overhang).powi(2);
-        let steady = self.single_track().at_tractor_radius(corner.sqrt() - 0.5 * width)?;
-        Some(steady.trailer_radius - 0.5 * self.trailer.width)
+        // Radius of a unit's axle whose front corner, so far ahead of it, runs on the circle.
+        let axle = |ahead: f64, width: f64| (outer.powi(2) - ahead.powi(2)).sqrt() - 0.5 * width;
+        let steady = self.single_track().at_tractor_radius(axle(wheelbase + front_overhang, width))?;
+        let trailer = &self.trailer;
+        let own = axle(trailer.wheelbase + trailer.kingpin_to_front, trailer.width);
+        Some(steady.trailer_radius.min(own) - 0.5 * trailer.width)
     }
 
     /// The constants that the stages need, for one of the loads and sub-steps of `substep` (s). `steer_max` replaces
