@@ -9,6 +9,7 @@ use offtrack::traffic::{Car, Contact, Network, Row, outlines};
 use serde::Serialize;
 
 use super::episode::Episode;
+use super::rank::nearest_rank;
 pub use lanes::LaneClasses;
 use lanes::LanesBeside;
 
@@ -239,10 +240,7 @@ pub(super) const NOTE_OF_LANES: &str = "PET: least time of an episode between tr
 
 /// The value that a fraction of all lies at or below.
 fn quantile(all: &[Among], value: fn(&Among) -> f64, fraction: f64) -> f64 {
-    let mut values: Vec<f64> = all.iter().map(value).collect();
-    values.sort_by(f64::total_cmp);
-    let index = (fraction * values.len() as f64).ceil() as usize;
-    values.get(index.clamp(1, values.len().max(1)) - 1).copied().unwrap_or(f64::NAN)
+    nearest_rank(&mut all.iter().map(value).collect::<Vec<f64>>(), fraction).unwrap_or(f64::NAN)
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@ use serde::Serialize;
 
 use super::driving::{Driving, JERK_BIN, LATERAL_BIN, N_BINS};
 use super::episode::{Episode, success_over_routes, wilson};
+use super::rank::nearest_rank;
 
 /// The episodes of a vehicle with a load.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -119,9 +120,7 @@ fn class_report(
         .map(|episode| Some(f64::from(episode.steps) * scenario.step / feasible(&episode.last)))
         .collect();
     let mut peaks: Vec<f64> = episodes.iter().map(|episode| episode.load_transfer_ratio_peak).collect();
-    peaks.sort_by(f64::total_cmp);
-    // The nearest rank.
-    let peak = |fraction: f64| peaks[((fraction * n as f64).ceil() as usize).clamp(1, n) - 1];
+    let mut peak = |fraction: f64| nearest_rank(&mut peaks, fraction).unwrap_or(0.0);
     let steps: f64 = episodes.iter().map(|episode| f64::from(episode.steps)).sum();
     let sum = |value: fn(&Driving) -> f64| {
         episodes.iter().filter_map(|episode| episode.driving.as_ref()).map(value).sum::<f64>()

@@ -42,6 +42,7 @@ mod part; // entry, ring and exit of a route
 mod running; // an episode under way
 mod tabular; // rows as Markdown, LaTeX, CSV
 pub mod seeds; // figures of several seeds
+mod rank; // percentiles
 pub mod interval; // intervals over routes, by bootstrap
 pub mod figures; // the figures of several, to their ends
 pub mod driving; // how a truck drives through an episode

@@ -44,6 +44,13 @@ pub struct Member {
     pub drawn: bool,
 }
 
+impl Member {
+    /// The load that stands for all where one is needed: the first that is ever drawn.
+    pub(super) fn first_load(&self) -> Option<&String> {
+        self.loads.iter().find(|(_, share)| 0.0 < **share).map(|(load, _)| load)
+    }
+}
+
 /// A vehicle with a load, as reports group episodes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Class {
@@ -197,7 +204,7 @@ impl Scenario {
         fleet.members.retain(|member| member.loads.values().any(|share| 0.0 < *share));
         let first = fleet.members.first()?;
         scenario.lock_of_levels = Some(self.lock_of_levels());
-        (scenario.vehicle, scenario.load) = (first.vehicle.clone(), first.loads.keys().next()?.clone());
+        (scenario.vehicle, scenario.load) = (first.vehicle.clone(), first.first_load()?.clone());
         Some(scenario)
     }
 }

@@ -8,6 +8,7 @@ use crate::comparison::Estimate;
 use crate::episode::wilson;
 use crate::interval::Cells;
 use crate::outcomes::Outcomes;
+use crate::rank::nearest_rank;
 use crate::tabular;
 
 /// What an entry's policy came to on one set of routes.
@@ -57,9 +58,6 @@ impl Stretch {
         }
         let arrived = outcomes.arrived();
         let mean = |sum: f64| (0 < arrived).then(|| sum / arrived as f64);
-        peaks.sort_by(f64::total_cmp);
-        // The nearest rank.
-        let rank = (0.99 * peaks.len() as f64).ceil() as usize;
         let (success_low, success_high) = wilson(arrived, success.episodes());
         Stretch {
             benchmark: drive.benchmark.clone(),
@@ -73,7 +71,7 @@ impl Stretch {
             success_high,
             lane_distance: mean(lane),
             time: mean(outcomes.step * steps),
-            load_transfer_ratio_p99: peaks.get(rank.max(1) - 1).copied().unwrap_or(0.0),
+            load_transfer_ratio_p99: nearest_rank(&mut peaks, 0.99).unwrap_or(0.0),
         }
     }
 }

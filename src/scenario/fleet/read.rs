@@ -54,7 +54,7 @@ pub(in crate::scenario) fn vehicles(
     };
     let fleet = drawn(reader, members, written.draw.as_ref().unwrap_or(&WrittenDraw::default()))?;
     let first = &fleet.members[0];
-    let load = first.loads.iter().find(|(_, share)| 0.0 < **share).map(|(load, _)| load.clone()).unwrap_or_default();
+    let load = first.first_load().cloned().unwrap_or_default();
     Ok((first.vehicle.clone(), load, Some(fleet)))
 }
 

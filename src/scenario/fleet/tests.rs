@@ -91,6 +91,9 @@ fn a_part_of_the_classes_is_a_benchmark_of_its_own() {
     let laden = scenario.with_classes(|class| class.load == "laden").unwrap();
     assert_eq!((laden.classes().len(), laden.load.as_str()), (2, "laden"));
     assert!(scenario.with_classes(|class| class.load == "feathers").is_none());
+    // A load that is never drawn stands for none.
+    scenario.fleet.as_mut().unwrap().members[0].loads.insert("empty".into(), 0.0);
+    assert_eq!(scenario.with_classes(|_| true).unwrap().load, "laden");
     let one = Scenario::named("attard2023").unwrap();
     assert!(
         one.with_classes(|class| class.load == "empty").is_some()
