@@ -254,6 +254,20 @@ def loads_30():
         }
         for place in seeds[0]
     }
+    runs = [archive[f"laden-{seed}"] for seed in range(220, 225)]
+    summary["lane_distance"] = {}
+    for place in [["laden2026", "test"], ["laden2026", "train"], ["laden2026-random", "test"]]:
+        reports = [report for run in runs for report in [run["evaluation"], *run["also"]]]
+        found = [
+            report["lane_distance_mean_arrived"]
+            for report in reports
+            if [report["benchmark"], report["split"]] == place
+        ]
+        distances = {
+            "mean": rounded(sum(found) / len(found)),
+            "of each seed": [rounded(distance) for distance in found],
+        }
+        summary["lane_distance"]["/".join(place)] = distances
     for row in archive["laden-validation"]:
         summary["validation"][row["seed"]] = {name: brief(row[name]) for name in ["every load", "laden_high"]}
     return summary
