@@ -1,19 +1,23 @@
 //! Drives a truck that follows and yields among cars over all routes of the study, prints how the episodes ended, and
 //! what the cars cost.
 //!
-//! `cargo run --release -p offtrack-evaluation --example among_cars -- [TIMES] [RUDE] [DEMAND]...`: each route 3 times,
-//! no rude drivers, 300, 900, 1,500 and 2,100 veh/h unless stated. The time of a step is that of a truck on all cores:
-//! on empty roads, among cars, and among cars that it observes, by the same actions; medians of five turns.
+//! `cargo run --release -p offtrack-evaluation --example among_cars -- [TIMES] [RUDE] [DEMAND]... [FILE.json]`: each
+//! route 3 times, no rude drivers, 300, 900, 1,500 and 2,100 veh/h unless stated. The time of a step is that of a truck
+//! on all cores: on empty roads, among cars, and among cars that it observes, by the same actions; medians of five
+//! turns. A file gets the times.
 
 #[path = "../evaluation/tests/among_cars/driver.rs"]
 #[expect(clippy::unwrap_used, reason = "it is a helper of tests too")]
 mod driver;
 
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
 use driver::{Ends, driven, simulator, world};
 use offtrack::world::World;
+use offtrack_evaluation::{files, provenance};
+use serde_json::json;
 
 const SEED: u32 = 7;
 
@@ -44,7 +48,10 @@ fn medians<const N: usize>(worlds: [&Arc<World>; N], times: usize, actions: &[Ve
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let numbers: Vec<f64> = std::env::args().skip(1).map(|word| word.parse()).collect::<Result<_, _>>()?;
+    let mut words: Vec<String> = std::env::args().skip(1).collect();
+    let file = words.pop_if(|word| word.ends_with(".json"));
+    let numbers: Vec<f64> = words.iter().map(|word| word.parse()).collect::<Result<_, _>>()?;
+    let mut times_of = Vec::new();
     let number = |index: usize, default: f64| numbers.get(index).copied().unwrap_or(default);
     let (times, rude) = (number(0, 3.0).max(1.0) as usize, number(1, 0.0));
     let demands = numbers.get(2..).filter(|demands| !demands.is_empty()).unwrap_or(&[300.0, 900.0, 1500.0, 2100.0]);
@@ -84,6 +91,21 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             among / alone,
             observing / alone
         );
+        times_of.push(json!({
+            "vehicles_per_hour": demand,
+            "cars": cars as f64 / steps as f64,
+            "step_on_an_empty_road_us": alone,
+            "among_cars": among / alone,
+            "where_they_are_observed": observing / alone,
+        }));
     }
+    let Some(file) = file else { return Ok(()) };
+    let written = json!({
+        "commit": provenance::commit(),
+        "machine": provenance::machine(),
+        "what": "a step of 0.1 s, two sub-steps, 29 rays, of a truck on all cores; medians of five turns",
+        "times": times_of,
+    });
+    files::write_json(Path::new(&file), &written)?;
     Ok(())
 }
