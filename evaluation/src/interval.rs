@@ -37,31 +37,42 @@ pub struct Cells {
     n_routes: usize,
     /// `[n_seeds][n_routes]`
     cells: Vec<Cell>,
+    /// The least and the greatest figure of an episode.
+    range: [f64; 2],
+}
+
+/// The range of no episode.
+const NO_RANGE: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
+
+fn widened([least, greatest]: [f64; 2], value: f64) -> [f64; 2] {
+    [least.min(value), greatest.max(value)]
 }
 
 impl Cells {
     /// No episode yet, of `n_seeds` seeds on `n_routes` routes.
     pub fn new(n_seeds: usize, n_routes: usize) -> Cells {
-        Cells { n_routes, cells: vec![Cell::default(); n_seeds * n_routes] }
+        Cells { n_routes, cells: vec![Cell::default(); n_seeds * n_routes], range: NO_RANGE }
     }
 
     /// Of one seed: a route, by any number of its own, and the figure of each episode.
     pub fn of_routes(episodes: impl Iterator<Item = (u32, f64)>) -> Cells {
-        let (mut indices, mut cells) = (HashMap::new(), Vec::new());
+        let (mut indices, mut cells, mut range) = (HashMap::new(), Vec::new(), NO_RANGE);
         for (route, value) in episodes {
+            range = widened(range, value);
             let index = *indices.entry(route).or_insert_with(|| {
                 cells.push(Cell::default());
                 cells.len() - 1
             });
             cells[index] = plus(cells[index], Cell { sum: value, n: 1.0 });
         }
-        Cells { n_routes: cells.len(), cells }
+        Cells { n_routes: cells.len(), cells, range }
     }
 
     /// Adds an episode.
     pub fn add(&mut self, seed: usize, route: usize, value: f64) {
         let cell = &mut self.cells[seed * self.n_routes + route];
         *cell = plus(*cell, Cell { sum: value, n: 1.0 });
+        self.range = widened(self.range, value);
     }
 
     /// Number of routes.
@@ -149,25 +160,39 @@ fn resamples(sides: &[(f64, &Cells)]) -> Vec<f64> {
 fn interval(sides: &[(f64, &Cells)]) -> Option<(f64, f64)> {
     let means: Option<Vec<f64>> = sides.iter().map(|(factor, cells)| Some(factor * cells.mean()?)).collect();
     let value: f64 = means?.iter().sum();
-    let tail = tail(sides)?;
-    if tail == 0.5 {
+    let Spread { tail, half } = spread(sides)?;
+    if half == 0.0 {
         return Some((value, value));
     }
     let mut found = resamples(sides);
     found.sort_by(f64::total_cmp);
+    let n_left_out = (tail * found.len() as f64) as usize;
+    if n_left_out == 0 {
+        // So few seeds or routes that no resample lies as far out: Student's, within what there can be.
+        let end = |of: usize| -> f64 {
+            sides.iter().map(|(factor, cells)| factor * cells.range[if *factor < 0.0 { 1 - of } else { of }]).sum()
+        };
+        return Some(((value - half).max(end(0)), (value + half).min(end(1))));
+    }
     let last = found.len().checked_sub(1)?;
-    let low = found[(tail * found.len() as f64) as usize];
-    let high = found[last - (tail * found.len() as f64) as usize];
+    let (low, high) = (found[n_left_out], found[last - n_left_out]);
     // Of few resamples the quantiles must not exclude the value itself.
     Some((low.min(value), high.max(value)))
 }
 
-/// The fraction of resamples to leave out at each end; one half where no route and no seed differs from another. `None`
-/// where there is nothing to draw: one seed on one route.
+/// How widely means are spread.
+struct Spread {
+    /// The fraction of resamples to leave out at each end.
+    tail: f64,
+    /// Half of Student's 95 % interval; 0 where no route and no seed differs from another.
+    half: f64,
+}
+
+/// The spread of the sum of means. `None` where there is nothing to draw: one seed on one route.
 ///
 /// Variances of the parts that are drawn add up, with the degrees of freedom of F. Satterthwaite (1946). A bootstrap's
 /// own variance of `n` parts is too small by (n - 1) / n.
-fn tail(sides: &[(f64, &Cells)]) -> Option<f64> {
+fn spread(sides: &[(f64, &Cells)]) -> Option<Spread> {
     let n_routes = sides[0].1.n_routes;
     let mut by_route = vec![0.0; n_routes];
     let mut parts: Vec<Vec<f64>> = Vec::new();
@@ -191,11 +216,12 @@ fn tail(sides: &[(f64, &Cells)]) -> Option<f64> {
     }
     // Sums of equal fractions differ in their last bits.
     if variance < 1e-24 {
-        return Some(0.5);
+        return Some(Spread { tail: 0.5, half: 0.0 });
     }
     // Of a single part it is a whole number, but for the last bits.
     let freedom = (variance * variance / squares + 1e-9) as usize;
-    Some(normal_tail(student_t(freedom.max(1)) * (variance / of_resamples).sqrt()))
+    let t = student_t(freedom.max(1));
+    Some(Spread { tail: normal_tail(t * (variance / of_resamples).sqrt()), half: t * variance.sqrt() })
 }
 
 /// The probability that a normal number lies above `x`, which is not negative: formula 26.2.17 of M. Abramowitz and

@@ -178,7 +178,8 @@ impl SeedsEvaluation {
         }));
         cells.push(format!("{:.1} %{}", 100.0 * self.success_mean, lane(self.lane_distance_mean_arrived)));
         cells.push(format!("{:.1} %, seed {}", 100.0 * self.success_worst, self.worst_seed));
-        let ends = self.success_mean_low.zip(self.success_mean_high);
+        // One without width, where all seeds are alike, says nothing.
+        let ends = self.success_mean_low.zip(self.success_mean_high).filter(|(low, high)| low < high);
         cells.push(
             ends.map_or_else(|| "-".to_owned(), |(low, high)| format!("{:.1} to {:.1} %", 100.0 * low, 100.0 * high)),
         );
@@ -267,7 +268,7 @@ mod tests {
 | 4             | 70.0 % (70/100), 0.50 m | 100.0 % (100/100), 0.50 m   | 61 s     |
 | mean          | 80.0 %, 0.50 m          | 100.0 %, 0.50 m             |          |
 | worst         | 70.0 %, seed 4          | 100.0 %, seed 3             |          |
-| 95 % interval | 0.0 to 100.0 %          | 100.0 to 100.0 %            |          |
+| 95 % interval | 0.0 to 100.0 %          | -                           |          |
 ";
         assert_eq!(seeds.table(), expected);
         let json = serde_json::to_value(&seeds).unwrap();

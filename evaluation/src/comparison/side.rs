@@ -66,7 +66,11 @@ impl Evaluated {
         let wrong = |what: String| Error::contents(file, format!("{what}; {again}"));
         let value: serde_json::Value = serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;
         if let Some(key) = ["outcomes", "asked"].into_iter().find(|&key| value.get(key).is_none()) {
-            let what = match value.get("evaluation") {
+            let what = match value.get("evaluation").or_else(|| value.get("runs")) {
+                Some(_) if value.get("runs").is_some() => {
+                    let what = "is the table of a training's seeds: evaluate the policy.safetensors of each";
+                    return Err(Error::contents(file, format!("{what} with `offtrack evaluate --json`")));
+                }
                 Some(_) => "is the report of a training run, which has no outcomes of single episodes".to_owned(),
                 None => format!("{key}: is missing, as in reports of earlier versions"),
             };
@@ -165,7 +169,16 @@ impl Side {
         let name = if path.is_dir() { path.file_name() } else { path.file_stem() };
         let name = name.map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned());
         let read = |file: PathBuf| Evaluated::read(&file).map(|evaluated| (file, evaluated));
-        Ok(Side::new(name, files.into_iter().map(read).collect::<Result<_, _>>()?))
+        let files = files.into_iter().map(read).collect::<Result<Vec<_>, _>>()?;
+        for (index, (file, evaluated)) in files.iter().enumerate() {
+            let is_same = |(_, other): &&(PathBuf, Evaluated)| other.outcomes == evaluated.outcomes;
+            if let Some((other, _)) = files[..index].iter().find(is_same) {
+                let other = reader::shown_path(other);
+                let message = format!("is the evaluation that {other} is: a folder has one for each training seed");
+                return Err(Error::contents(file, message));
+            }
+        }
+        Ok(Side::new(name, files))
     }
 
     /// A side of these files.

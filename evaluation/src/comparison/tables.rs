@@ -49,9 +49,9 @@ impl Figure {
         }
     }
 
-    /// The ends of an interval.
+    /// The ends of an interval; none of one without width, which says nothing.
     fn interval(self, estimate: &Estimate) -> String {
-        let ends = estimate.low.zip(estimate.high);
+        let ends = estimate.low.zip(estimate.high).filter(|(low, high)| low < high);
         ends.map_or_else(|| "-".to_owned(), |(low, high)| format!("{} to {}", self.shown(low), self.shown(high)))
     }
 

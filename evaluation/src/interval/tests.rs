@@ -93,6 +93,29 @@ fn what_is_equal_on_every_route_has_an_interval_without_width_and_one_route_has_
 }
 
 #[test]
+fn of_few_seeds_the_interval_is_students_within_what_there_can_be() {
+    // The first seed arrives on a part of the routes, the others on all but one and on all.
+    let cells = |of_first: u32| {
+        let mut cells = Cells::new(3, 20);
+        for route in 0..20 {
+            for (seed, arrives) in [route < of_first, route < 19, true].into_iter().enumerate() {
+                cells.add(seed, route as usize, f64::from(u8::from(arrives)));
+            }
+        }
+        cells
+    };
+    assert_eq!(cells(6).interval(), Some((0.0, 1.0)));
+    // Both sides' seeds differ here: there is no more than all of them.
+    let (low, high) = cells(20).interval_of_difference(&cells(6)).unwrap();
+    assert!(-1.0 < low && low < 0.0 && high == 1.0, "{low} {high}");
+    let close = cells(18);
+    let (low, high) = close.interval().unwrap();
+    // Of seeds alone it is 4.303 standard errors of three fractions, 0.9, 0.95 and 1; routes add to it.
+    let mean = close.mean().unwrap();
+    assert!(high == 1.0 && 4.3 * 0.05 / 3.0_f64.sqrt() < mean - low, "{low} {mean} {high}");
+}
+
+#[test]
 fn a_paired_difference_is_known_better_than_either_mean() {
     let cells = of_experiment(5, 23);
     // The other arrives on two more episodes of every third route.
