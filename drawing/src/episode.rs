@@ -18,6 +18,7 @@ use crate::lettering::{Align, Lettering};
 use crate::road::RoadLayers;
 use crate::sweep::swept_area;
 use crate::view::{Straights, View, colour, number};
+use offtrack_evaluation::policies::rule;
 use offtrack_evaluation::recording::{Frame, Recording};
 
 /// Length of the route shown before and after the ring: all of it at a benchmark's usual lengths (m).
@@ -266,7 +267,7 @@ impl<'a> Scene<'a> {
             "random" => "random actions",
             "yields" => "rule that follows and yields",
             "follows" => "rule that follows",
-            under_rule if under_rule.starts_with("yields:") => "learned policy under the rule",
+            capped if rule::under(capped).is_some() => "learned policy under the rule",
             _ => "learned policy",
         }
     }

@@ -144,7 +144,7 @@ impl Road {
         let at = |stage: Stage| move |error: Error| (stage, error);
         let gutters = written.gutters(&reader).map_err(at(Stage::Values))?;
         let (ring, arms) = written.checked(&reader).map_err(at(Stage::Values))?;
-        let (kerbs, corners) = kerb::kerbs(&reader, &ring, &arms).map_err(at(Stage::Kerbs))?;
+        let (kerbs, corners) = kerb::kerbs(&reader, &ring, &arms, slack).map_err(at(Stage::Kerbs))?;
         let lanes = Lanes::new(&reader, &ring, &arms).map_err(at(Stage::Lanes))?;
         check::lanes_clear_of_kerbs(&reader, &kerbs, &arms, &lanes, slack).map_err(at(Stage::Clear))?;
         check::lanes_beside_each_other(&reader, &arms, &lanes, slack).map_err(at(Stage::Beside))?;

@@ -43,7 +43,9 @@ pub fn dxf(road: &Road, gutter: Gutter, shown: &[&Shown]) -> String {
         names.push(own_layer(&names, one.row.movement(), index));
     }
     drawing.pair(999, "offtrack fits: lengths in metres");
-    for (code, value) in [(0, "SECTION"), (2, "HEADER"), (9, "$ACADVER"), (1, "AC1009"), (0, "ENDSEC")] {
+    let head =
+        [(0, "SECTION"), (2, "HEADER"), (9, "$ACADVER"), (1, "AC1009"), (9, "$INSUNITS"), (70, "6"), (0, "ENDSEC")];
+    for (code, value) in head {
         drawing.pair(code, value);
     }
     drawing.layers(&names, road.has_apron());
@@ -212,7 +214,7 @@ impl Drawing {
 
 #[cfg(test)]
 mod tests {
-    use offtrack::map::drawing::{Layers, Unit, read};
+    use offtrack::map::drawing::{Layers, read};
     use offtrack::map::ground::Ground;
 
     use super::super::geojson;
@@ -283,7 +285,7 @@ mod tests {
             kerbs: "KERB".into(),
             lanes: "LANE".into(),
             aprons: "APRON".into(),
-            unit: Some(Unit::Metre),
+            unit: None,
             lane_width: 4.0,
             ring: None,
             arms: Vec::new(),

@@ -173,6 +173,10 @@ impl Gutters {
         let edges = left(faces, solid);
         // The outer boundary and the island, apart from each other.
         if edges.loops.len() < 2 {
+            if self.mouths.is_some() {
+                let expected = "with the others it leaves no way through; it must be 0 where an arm has its mouth";
+                return Err(reader.invalid("ring.mouth_gutter", "given", expected));
+            }
             let value = format_args!("{} m and others", shown(self.ring)).to_string();
             return Err(reader.invalid(
                 "ring.gutter",

@@ -20,8 +20,10 @@ pub(super) fn order(arms: &[Arm]) -> impl Iterator<Item = Kerb> {
     [Kerb::Outer, Kerb::Island].into_iter().chain(splitters)
 }
 
-/// The kerb faces as an outline, and the kerbs from each arm to the next. Fails if they cross each other.
-pub(super) fn kerbs(reader: &Reader, ring: &Ring, arms: &[Arm]) -> Result<(Outline, Vec<Curve>), Error> {
+/// The kerb faces as an outline, and the kerbs from each arm to the next. Fails if they cross each other; without slack
+/// (m) also where rounding finds that the last piece of a splitter island meets the first, whose joint it is: random
+/// roads have been drawn so.
+pub(super) fn kerbs(reader: &Reader, ring: &Ring, arms: &[Arm], slack: f64) -> Result<(Outline, Vec<Curve>), Error> {
     let corners: Vec<Curve> = (0..arms.len()).map(|arm| corner(reader, ring, arms, arm)).collect::<Result<_, _>>()?;
     corners_apart(reader, arms, &corners)?;
     let mut boundary = Curve::default();
@@ -42,7 +44,7 @@ pub(super) fn kerbs(reader: &Reader, ring: &Ring, arms: &[Arm]) -> Result<(Outli
             )
         })?;
         let island = island.turned(arm.bearing);
-        splitter_apart(reader, ring, index, &island, &loops)?;
+        splitter_apart(reader, ring, (index, &island), &loops, slack)?;
         loops.push(island);
     }
     Ok((Outline::new(loops), corners))
@@ -85,7 +87,7 @@ fn corners_apart(reader: &Reader, arms: &[Arm], corners: &[Curve]) -> Result<(),
     let n = corners.len();
     for first in 0..n {
         for second in first..n {
-            if cross(&corners[first], (first != second).then_some(&corners[second])) {
+            if cross(&corners[first], (first != second).then_some(&corners[second]), 0.0) {
                 // Corner i lies between arms i and i + 1: neighbouring corners have the arm between them in common.
                 let (a, b) = if first == second { (first, (first + 1) % n) } else { (first, second) };
                 return Err(reader.invalid(
@@ -119,28 +121,38 @@ fn corners_apart(reader: &Reader, arms: &[Arm], corners: &[Curve]) -> Result<(),
     Ok(())
 }
 
-/// Whether two curves cross or, without a second, whether the first crosses itself other than at its joints.
-fn cross(curve: &Curve, other: Option<&Curve>) -> bool {
-    let joint = |index: usize, p: DVec2| p.distance(curve.pieces[index].end()) < 1e-6;
-    (0..curve.pieces.len()).any(|index| {
+/// Whether two curves cross or, without a second, whether the first crosses itself other than at its joints, of which a
+/// closed one has one between its last piece and its first where there is slack.
+fn cross(curve: &Curve, other: Option<&Curve>, slack: f64) -> bool {
+    let n = curve.pieces.len();
+    let joint = |index: usize, next: usize, p: DVec2| {
+        let is_at = |end: DVec2| p.distance(end) < 1e-6;
+        let closes = 0.0 < slack && index == 0 && next + 1 == n && is_at(curve.pieces[0].start());
+        (index + 1 == next && is_at(curve.pieces[index].end())) || (closes && is_at(curve.pieces[next].end()))
+    };
+    (0..n).any(|index| {
         let piece = &curve.pieces[index];
         match other {
             Some(other) => other.pieces.iter().any(|there| !piece.meetings(there).is_empty()),
             None => {
                 let after = curve.pieces.iter().enumerate().skip(index + 1);
-                after.into_iter().any(|(next, there)| {
-                    piece.meetings(there).into_iter().any(|p| index + 1 != next || !joint(index, p))
-                })
+                after.into_iter().any(|(next, there)| piece.meetings(there).into_iter().any(|p| !joint(index, next, p)))
             }
         }
     })
 }
 
 /// A splitter island lies outside the ring and does not meet the earlier loops.
-fn splitter_apart(reader: &Reader, ring: &Ring, arm: usize, island: &Curve, loops: &[Curve]) -> Result<(), Error> {
+fn splitter_apart(
+    reader: &Reader,
+    ring: &Ring,
+    (arm, island): (usize, &Curve),
+    loops: &[Curve],
+    slack: f64,
+) -> Result<(), Error> {
     let key = format!("arm[{arm}].splitter");
     let refused = |value: String, expected: &str| Err(reader.invalid(&key, value, expected));
-    if cross(island, None) {
+    if cross(island, None, slack) {
         return refused("crosses itself".into(), "corners must go around the island once");
     }
     let (nearest, edge) = (island.distance(DVec2::ZERO), ring.outer() - ring.gutter);
@@ -148,7 +160,7 @@ fn splitter_apart(reader: &Reader, ring: &Ring, arm: usize, island: &Curve, loop
         let value = format!("{} m from the ring's centre", differing(nearest, edge));
         return refused(value, &format!("must stay out of the ring: {} m", shown(edge)));
     }
-    if loops.iter().any(|other| cross(island, Some(other)))
+    if loops.iter().any(|other| cross(island, Some(other), slack))
         || !Outline::new(loops.to_vec()).contains(island.point_at(0.0))
     {
         return refused("meets a kerb".into(), "must lie on the road, away from the kerbs and other islands");

@@ -242,6 +242,25 @@ fn a_splitter_on_a_lane_or_in_the_ring_is_refused() {
 }
 
 #[test]
+fn a_splitter_is_one_whatever_its_arms_bearing() {
+    let [near, far] = [(28.0, 0.8, 0.5), (45.0, 0.0, 0.3)];
+    let corner = |(along, offset, radius): (f64, f64, f64), side: f64| {
+        format!("{{ along = {along:.1}, offset = {:.1}, radius = {radius} }}", side * offset)
+    };
+    let corners = [corner(near, -1.0), corner(far, 1.0), corner(near, 1.0)].join(", ");
+    let text = with_kerbs_at(9.5).replace("length = 100.0", &format!("length = 100.0\nsplitter = [{corners}]"));
+    for turn in 0..12 {
+        let turned = |text: String, bearing: u32| {
+            let there = format!("bearing_deg = {bearing}.0\n");
+            assert!(text.contains(&there));
+            text.replace(&there, &format!("bearing_deg = {bearing}.{:02}\n", 8 * turn))
+        };
+        let text = [0, 90, 180, 270].into_iter().fold(text.clone(), turned);
+        assert_eq!(read(&text).map(|_| ()).map_err(|error| error.to_string()), Ok(()));
+    }
+}
+
+#[test]
 fn a_lane_that_runs_into_a_kerb_is_refused() {
     let lane = "[arm.entry.right]\npoints = [{ along = 30.0, offset = 8.0 }]\nring_radius = 15.0\n[arm.exit.kerb]";
     assert!(refusal("[arm.exit.kerb]", 0, lane).contains("arm[0].entry.right: "));
