@@ -218,6 +218,11 @@ impl World {
         self.step_limit(truck) as usize + 1
     }
 
+    /// Most steps of any episode.
+    pub fn most_steps_of_all(&self) -> usize {
+        self.step_limits.iter().copied().max().map_or(0, |limit| limit as usize + 1)
+    }
+
     /// A rig's distance sensors, trailer's first.
     #[inline]
     pub fn rays_of(&self, rig: &Rig) -> &[Ray; N_RAYS] {

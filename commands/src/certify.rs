@@ -58,8 +58,8 @@ pub struct Args {
     /// Write the certificate to this file as JSON, after every route.
     #[arg(long)]
     json: Option<PathBuf>,
-    /// Drive the sequences of this file again and search for nothing.
-    #[arg(long, conflicts_with_all = ["split", "route", "policy", "widths", "hold", "json"])]
+    /// Drive the sequences of this file again and search for nothing; --route says where its roads are now.
+    #[arg(long, conflicts_with_all = ["split", "policy", "widths", "hold", "json"])]
     verify: Option<PathBuf>,
 }
 
@@ -73,13 +73,13 @@ pub fn run(args: &Args) -> Result<(), Error> {
         });
     }
     match &args.verify {
-        Some(file) => again(file, args.benchmark.as_deref(), args.load.as_deref()),
+        Some(file) => again(file, args),
         None => certify(args),
     }
 }
 
 /// Drives a certificate's sequences again.
-fn again(path: &Path, benchmark: Option<&str>, load: Option<&str>) -> Result<(), Error> {
+fn again(path: &Path, args: &Args) -> Result<(), Error> {
     let certificate = Certificate::read(path)?;
     let own = || {
         roads::benchmark(&certificate.benchmark).map_err(|error| {
@@ -87,13 +87,18 @@ fn again(path: &Path, benchmark: Option<&str>, load: Option<&str>) -> Result<(),
             Error::contents(path, format!("benchmark: {error}; {what}"))
         })
     };
-    let scenario = benchmark.map_or_else(own, roads::benchmark)?;
-    let mut scenario = roads::with_load(scenario, load)?;
+    let scenario = args.benchmark.as_deref().map_or_else(own, roads::benchmark)?;
+    let mut scenario = roads::with_load(scenario, args.load.as_deref())?;
     // Roads that the benchmark does not have are read or drawn again. Files of before do not say what was asked for.
     let is_random = |name: &String| name.rsplit_once('/').is_some_and(|(road, _)| procedural::address(road).is_some());
     let names: Vec<String> = certificate.routes.iter().map(|route| route.name.clone()).collect();
-    if !certificate.asked.is_empty() {
-        roads::narrow(&mut scenario, "--route", &certificate.asked, &Split::ALL)?;
+    if !args.route.is_empty() {
+        roads::narrow(&mut scenario, "--route", &args.route, &Split::ALL)?;
+    } else if !certificate.asked.is_empty() {
+        roads::narrow(&mut scenario, "asked", &certificate.asked, &Split::ALL).map_err(|error| {
+            let what = "a road's path is from where the certificate was made; --route says where it is now";
+            Error::contents(path, format!("{error}; {what}"))
+        })?;
     } else if names.iter().any(is_random) {
         roads::narrow(&mut scenario, "--route", &names, &Split::ALL)?;
     }

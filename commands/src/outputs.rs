@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use offtrack::files::reader::{TEXT_LIMIT, read_text, shown_path};
+use offtrack::files::writer::Output;
 use offtrack_evaluation::error::Error;
 use toml::Value;
 
@@ -54,6 +55,10 @@ pub fn distinct(written: &[Named], read: &[Named]) -> Result<(), Error> {
             && !std::fs::metadata(folder).map_err(Error::write(file))?.is_dir()
         {
             return Err(Error::write(file)(std::io::ErrorKind::NotADirectory.into()));
+        }
+        // A pipe would wait for its reader.
+        if !file.exists() || file.is_file() {
+            Output::create(file).map_err(Error::write(file))?;
         }
     }
     Ok(())

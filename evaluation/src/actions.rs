@@ -58,7 +58,7 @@ impl Recorded {
         if let Some((key, found, expected)) = numbers.into_iter().find(|(_, found, expected)| found != expected) {
             return Err(wrong(format!("{key}: {found}; {expected} are needed")));
         }
-        let limit = world.step_limits.iter().copied().max().unwrap_or(0) as usize + 1;
+        let limit = world.most_steps_of_all();
         let sequence = |(episode, text): (usize, &String)| {
             actions(text, n_actions, limit).map_err(|message| wrong(format!("episodes, {episode}: {message}")))
         };

@@ -89,6 +89,13 @@ impl Policy {
         {
             let action = |actions: &[Action]| format!("action {index} is {}", of_action(&actions[index]));
             (here, there) = (action(&self.actions), action(&world.actions));
+            if here == there {
+                let exactly = |actions: &[Action]| {
+                    let Action { steering, speed } = actions[index];
+                    format!("action {index} is {steering:?} rad, {speed:?} m/s")
+                };
+                (here, there) = (exactly(&self.actions), exactly(&world.actions));
+            }
         }
         Err(format!(
             "learned with another action table: {here} here, {there} in the benchmark; a policy that learned with the \

@@ -251,6 +251,13 @@ fn a_certificate_of_roads_of_an_own_distribution_draws_them_again_from_its_file(
     succeed(&offtrack(&["certify", "--route", &route, "--widths", "16", "--hold", "5", "--json", &json]));
     assert_eq!(place.json("c.json")["asked"], Value::from(vec![route]));
     succeed(&offtrack(&["certify", "--verify", &json]));
+    let moved = place.text("other/wide.toml");
+    std::fs::create_dir(place.file("other")).unwrap();
+    std::fs::rename(place.file("wide.toml"), &moved).unwrap();
+    let said = refusal(&offtrack(&["certify", "--verify", &json]), 2);
+    assert!(said.contains("c.json: ") && said.contains("--route says where it is now"), "{said}");
+    let there = format!("{moved}/7/12/S-left-4");
+    succeed(&offtrack(&["certify", "--verify", &json, "--route", &there]));
 }
 
 #[test]

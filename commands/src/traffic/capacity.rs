@@ -126,8 +126,8 @@ impl Case<'_> {
     }
 }
 
-/// Means over all lanes of a kind that meet no other of their arm, flow by flow: of the flow, of the capacity with its least and greatest, of the
-/// manual's.
+/// Means over all lanes of a kind that meet no other of their arm, flow by flow: of the flow, of the capacity with its
+/// least and greatest, of the manual's.
 struct Mean {
     circulating: f64,
     capacity: f64,
