@@ -87,11 +87,12 @@ def steer_to_carla(angle: float) -> float:
 def steer_from_wheels(left: float, right: float) -> float:
     """Steer angle of the front axle, positive to the left [rad], from those of its wheels, positive to the right [deg].
 
-    Of wheels that turn about one centre the mean of the cotangents is the axle's.
+    Of wheels that turn about one centre the mean of the cotangents is the axle's; of wheels with toe, which all but
+    straight ones turn to different sides by, that of the angles.
     """
     tangents = math.tan(math.radians(left)), math.tan(math.radians(right))
-    if min(abs(tangent) for tangent in tangents) < 1e-6:
-        return 0.0
+    if tangents[0] * tangents[1] <= 0.0:
+        return -math.radians(0.5 * (left + right))
     return -math.atan(2 / (1 / tangents[0] + 1 / tangents[1]))
 
 
@@ -178,7 +179,7 @@ def drive(args: argparse.Namespace) -> str:
 
     policy = offtrack_sim.Policy.shipped(args.policy)
     # A benchmark with one vehicle does not name it.
-    has_one = ("", args.load) in offtrack_sim.Batch(args.benchmark, 1).classes
+    has_one = ("", args.load) in offtrack_sim.Observer(args.benchmark, routes=[args.route]).classes
     vehicle = ("" if has_one else args.vehicle, args.load)
     observer = offtrack_sim.Observer(args.benchmark, routes=[args.route], vehicles=[vehicle])
     policy.check(observer)

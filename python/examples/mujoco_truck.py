@@ -234,6 +234,19 @@ def made_with() -> dict[str, Any]:
     return made
 
 
+def check_files(args: argparse.Namespace) -> None:
+    """Ends the program where a file could not be written, before anything is driven."""
+    for file in filter(None, (args.json, args.film)):
+        try:
+            file.parent.mkdir(parents=True, exist_ok=True)
+            is_new = not file.exists()
+            file.open("ab").close()
+            if is_new:
+                file.unlink()
+        except OSError as error:
+            raise SystemExit(str(error)) from None
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description="A policy in a multibody truck", formatter_class=argparse.ArgumentDefaultsHelpFormatter
@@ -253,12 +266,8 @@ def main() -> None:
     args = parser.parse_args()
     if args.film and args.film.suffix != ".gif":
         parser.error("--film: a name that ends in .gif is needed")
-    try:
-        for file in filter(None, (args.json, args.film)):
-            file.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        parser.error(str(error))
     if args.validate:
+        check_files(args)
         rows = validate()
         if args.json:
             write_json(args.json, made_with() | {"checks": rows})
@@ -268,12 +277,13 @@ def main() -> None:
     try:
         is_file = args.policy.endswith(".safetensors")
         policy = offtrack_sim.Policy.load(args.policy) if is_file else offtrack_sim.Policy.shipped(args.policy)
-        benchmark = args.benchmark or policy.benchmark
+        args.benchmark = args.benchmark or policy.benchmark
         named = None if args.routes == ["test"] else args.routes
-        args.names = offtrack_sim.Batch(benchmark, 1, split="test", routes=named).split_routes
+        args.names = offtrack_sim.Batch(args.benchmark, 1, split="test", routes=named).split_routes
     except ValueError as error:
-        raise SystemExit(f"{error}" if args.benchmark else f"{error}; --benchmark names another one") from None
-    args.benchmark = benchmark
+        hint = "; --benchmark names another one" if str(error).startswith("benchmark: ") else ""
+        raise SystemExit(f"{error}{hint}") from None
+    check_files(args)
     results: dict[str, dict[str, Any]] = {}
     for load in args.load:
         starts = Starts(args, load)

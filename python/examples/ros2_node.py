@@ -71,7 +71,7 @@ class Driver(Node):
         super().__init__("offtrack_driver")
         given = {name: str(self.declare_parameter(name, default).value) for name, default in PARAMETERS.items()}
         self.policy = offtrack_sim.Policy.shipped(given["policy"])
-        vehicle = vehicle_of(given["benchmark"], given["vehicle"], given["load"])
+        vehicle = vehicle_of(given["benchmark"], given["route"], given["vehicle"], given["load"])
         self.observer = offtrack_sim.Observer(given["benchmark"], routes=[given["route"]], vehicles=[vehicle])
         self.policy.check(self.observer)
         self.begun = False
@@ -168,9 +168,10 @@ class Driver(Node):
         self.commands.publish(message)
 
 
-def vehicle_of(benchmark: str, vehicle: str, load: str) -> tuple[str, str]:
+def vehicle_of(benchmark: str, route: str, vehicle: str, load: str) -> tuple[str, str]:
     """Vehicle and load as a benchmark names them: one with a single vehicle does not name it."""
-    return ("", load) if ("", load) in offtrack_sim.Batch(benchmark, 1).classes else (vehicle, load)
+    has_one = ("", load) in offtrack_sim.Observer(benchmark, routes=[route]).classes
+    return "" if has_one else vehicle, load
 
 
 def yaw(rotation: Quaternion) -> float:

@@ -29,7 +29,7 @@ from .arguments import (
 from .episodes import Ends, Floats, GivenStart, Ints, Start
 from .geometry import Road
 from .layout import COLUMNS
-from .scenarios import Scenario, given, kept
+from .scenarios import Scenario, given, kept, kept_routes
 from .state import checked_state
 
 Array = npt.NDArray[Any]
@@ -133,7 +133,7 @@ class Batch(_offtrack.Batch):
             "scenario": kept(scenario),
             "num_envs": batch.num_envs,
             "split": split,
-            "routes": names,
+            "routes": kept_routes(names),
             "autoreset": batch.autoreset,
             "num_threads": num_threads,
             "device": device,

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from . import _offtrack
 from .arguments import checked_integer, is_sequence, names_of, numbers, single, text, within
-from .scenarios import Scenario, given, kept
+from .scenarios import Scenario, given, kept, kept_routes
 from .state import check_world
 
 Floats = npt.NDArray[np.float32]
@@ -110,7 +110,7 @@ class Observer(_offtrack.Observer):
         observer.vehicles = [observer.classes[0]] * n if stated is None else list(stated)
         observer._arguments = {
             "scenario": kept(scenario),
-            "routes": names,
+            "routes": kept_routes(names),
             "vehicles": stated,
             "num_threads": num_threads,
         }
@@ -144,7 +144,8 @@ class Observer(_offtrack.Observer):
     ) -> Seen:
         """Begins an episode of each truck at any place along its route: what lies behind counts as passed.
 
-        Wheels are straight and the target speed is the truck's, as where the simulator begins. The start is not judged.
+        Wheels are straight and the target speed is the truck's, as where the simulator begins a route; in a bend
+        ``observe`` may come first, which takes what the truck's electronics know. The start is not judged.
         Of a route that passes a place twice the nearer lane is taken, unless ``waypoint`` says which is meant.
 
         Args:
@@ -153,7 +154,8 @@ class Observer(_offtrack.Observer):
             trailer_heading: Heading of the trailer [rad].
             speed: Speed of the drive axle along the tractor's heading [m/s].
             waypoint: Index of a waypoint near which the trucks are, such as ``Seen.waypoint`` of an episode that goes
-                on, one or k of them: the next is looked for at most 16 waypoints away. None if it is not known.
+                on, one or k of them: the next is looked for from 16 waypoints before it to 16 behind it. None if it
+                is not known.
             trucks: Indices of the k trucks that begin; None for all of them.
 
         Raises:

@@ -196,7 +196,7 @@ def _passed(reader: _Reader, node: Any) -> tuple[str, tuple[str, Any] | None]:
     if kind in SHAPES or (kind == "Gather" and _is_one_step(reader, node)):
         return node.input[0], None
     if kind == "ArgMax":
-        if reader.attribute(node, "axis", 0) == 0 or reader.attribute(node, "select_last_index", 0):
+        if reader.attribute(node, "axis", 0) not in (-1, 1, 2) or reader.attribute(node, "select_last_index", 0):
             raise TypeError(f"{_named(node)}: the first of the largest values of each row is needed, so the last axis")
         return node.input[0], None
     if kind in ("Relu", "Tanh"):
@@ -241,13 +241,15 @@ def _changes_numbers(reader: _Reader, node: Any) -> bool:
 
 
 def _is_one_step(reader: _Reader, node: Any) -> bool:
-    """Whether a Gather takes the first or last step of what a memory gives: a policy sees one step at a time."""
-    index = reader.constant(node.input[1])
+    """Whether a Gather takes the first or last step of what comes from a memory: a policy sees one step at a time."""
+    index, axis = reader.constant(node.input[1]), reader.attribute(node, "axis", 0)
+    if index is None or np.ndim(index) != 0 or int(index) not in (0, -1) or axis not in (0, 1):
+        return False
     before = reader.producers.get(node.input[0])
-    while before is not None and before.op_type in SHAPES:
-        before = reader.producers.get(before.input[0])
-    behind_memory = before is not None and before.op_type in ("GRU", "LSTM")
-    return behind_memory and index is not None and np.ndim(index) == 0 and int(index) in (0, -1)
+    while before is not None and before.op_type not in ("GRU", "LSTM"):
+        flows = [name for name in before.input if reader.constant(name) is None]
+        before = reader.producers.get(flows[0]) if len(flows) == 1 else None
+    return before is not None
 
 
 def _gemm(reader: _Reader, node: Any) -> Layer:

@@ -149,6 +149,11 @@ def kept(scenario: Scenario) -> str | Benchmark:
     return os.path.abspath(source) if _is_file(source) else source
 
 
+def kept_routes(names: list[str] | None) -> list[str] | None:
+    """Names of routes for a pickle: roads of files by paths that are found from another folder too."""
+    return None if names is None else [os.path.abspath(name) if ".toml" in name else name for name in names]
+
+
 def whole(scenario: Scenario) -> Benchmark:
     """The same as a benchmark in memory."""
     if isinstance(scenario, Benchmark):

@@ -334,7 +334,7 @@ impl Batch {
 
     /// What `resume` needs beside the columns: the sums of the tally.
     fn progress(&self) -> PyResult<Vec<i64>> {
-        guarded(|| Ok(self.state()?.tally()?.sums.to_vec()))
+        guarded(|| Ok(self.sums()?.sums.to_vec()))
     }
 
     /// Takes what another batch's `progress` and `last_ended` gave.
@@ -348,7 +348,7 @@ impl Batch {
     }
 
     fn tally<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let tally = guarded(|| self.state()?.tally())?;
+        let tally = guarded(|| self.sums())?;
         let dict = PyDict::new(py);
         dict.set_item("env_steps", tally.env_steps())?;
         dict.set_item("episodes", tally.episodes())?;

@@ -42,6 +42,9 @@ def test_the_axles_steer_angle_is_between_those_of_its_wheels() -> None:
     assert steer_from_wheels(left, right) == pytest.approx(angle)
     assert steer_from_wheels(-right, -left) == pytest.approx(-angle)
     assert steer_from_wheels(0.0, 0.0) == 0.0
+    for toe in (0.01, 0.2):
+        assert steer_from_wheels(toe, -toe) == 0.0
+        assert abs(steer_from_wheels(toe, -1.001 * toe)) < math.radians(0.001)
 
 
 def test_a_truck_is_where_its_drive_axle_is_and_as_fast_as_along_its_heading() -> None:

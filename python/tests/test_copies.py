@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import offtrack_sim
-from offtrack_sim import Batch, Policy
+from offtrack_sim import Batch, Observer, Policy
 
 MODES = ["same_step", "next_step", "disabled"]
 WAYS: dict[str, Callable[[Any], Any]] = {
@@ -153,6 +153,25 @@ def test_a_pickle_of_a_benchmark_that_has_changed_since_is_refused(short_benchma
     file.write_text(file.read_text().replace("time_limit = 1.0", "time_limit = 1.5"))
     with pytest.raises(ValueError, match="scenario: short has changed since this state was kept"):
         pickle.loads(kept)
+
+
+def test_a_pickle_of_a_batch_on_a_road_of_a_file_is_read_in_another_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    offtrack_sim.write_scenarios(tmp_path / "all")
+    (tmp_path / "own.toml").write_text((tmp_path / "all/roundabouts/50m.toml").read_text())
+    (tmp_path / "16m.toml").write_text((tmp_path / "own.toml").read_text())
+    monkeypatch.chdir(tmp_path)
+    batch = Batch("attard2023", 2, routes=["own.toml"], seed=5)
+    observer = Observer("attard2023", [f"own.toml/{batch.route_names[0].split('/')[1]}"])
+    kept = pickle.dumps((batch, observer))
+    # A road of a file is not one of the benchmark's that has its name.
+    with pytest.raises(ValueError, match="another road of the batch is 16m too: rename one"):
+        Batch("attard2023", 2, routes=["./16m.toml"])
+    monkeypatch.chdir("/")
+    there, other = pickle.loads(kept)
+    assert there.route_names == batch.route_names and (there.observation == batch.observation).all()
+    assert other.waypoints(other.routes[0]).shape == observer.waypoints(observer.routes[0]).shape
 
 
 def test_trucks_that_were_held_when_a_state_was_kept_are_known_by_their_new_routes() -> None:

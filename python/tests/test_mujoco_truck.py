@@ -78,7 +78,7 @@ def test_the_same_seed_drives_the_same_and_ice_ends_an_episode(monkeypatch: pyte
 
 
 def test_a_truck_or_a_policy_that_is_not_there_is_refused_with_what_is(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit, match="--vehicle: us_wb62; attard2023 has a trailer with a wheelbase of 7.756 m"):
         run(monkeypatch, "--policy", "attard2023", "--load", "empty", "--vehicle", "us_wb62", "--starts", "1")
@@ -88,5 +88,8 @@ def test_a_truck_or_a_policy_that_is_not_there_is_refused_with_what_is(
         run(monkeypatch, "--policy", "attard2023-lane", "--load", "empty")
     with pytest.raises(SystemExit):
         run(monkeypatch, "--film", "film.xyz")
+    assert "--film: a name that ends in .gif is needed" in capsys.readouterr().err
+    with pytest.raises(SystemExit, match="Is a directory"):
+        run(monkeypatch, "--json", str(tmp_path))
     with pytest.raises(SystemExit, match="--load: daf_xf laden_worst; laden2026 has daf_xf empty, daf_xf half"):
         run(monkeypatch, "--load", "laden_worst")

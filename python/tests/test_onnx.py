@@ -154,6 +154,7 @@ def test_a_recurrent_graph_over_time_is_read_as_one_of_a_step(tmp_path: Path) ->
         ("Cast", ["x"], {"to": onnx.TensorProto.INT32}, "it rounds, or moves values among each other"),
         ("Gather", ["x", "last"], {"axis": 1}, "node 'y', Gather: a policy file has no place for it"),
         ("ArgMax", ["x"], {"axis": 0}, "of each row is needed, so the last axis"),
+        ("ArgMax", ["x"], {"axis": -2}, "of each row is needed, so the last axis"),
         ("ArgMax", ["x"], {}, "of each row is needed, so the last axis"),
         ("ArgMax", ["x"], {"axis": 1, "select_last_index": 1}, "the first of the largest values"),
     ],

@@ -144,6 +144,23 @@ def test_after_it_braked_it_tells_the_policy_what_it_asked_for(driver: Driver, m
     assert told[-1]["acceleration"] == pytest.approx(-2.5)
 
 
+@pytest.mark.parametrize(
+    ("benchmark", "route", "load", "expected"),
+    [
+        ("maps2026", "town03/E-left-1", "empty", ("", "empty")),
+        ("laden2026", ROUTE, "half", ("daf_xf", "half")),
+    ],
+)
+def test_a_benchmark_of_one_vehicle_does_not_name_it(
+    driver: Driver, benchmark: str, route: str, load: str, expected: tuple[str, str]
+) -> None:
+    from ros2_node import vehicle_of
+
+    named = vehicle_of(benchmark, route, "daf_xf", load)
+    assert named == expected
+    offtrack_sim.Observer(benchmark, routes=[route], vehicles=[named])
+
+
 def test_a_quaternions_yaw_is_its_heading(driver: Driver) -> None:
     from geometry_msgs.msg import Quaternion
     from ros2_node import yaw

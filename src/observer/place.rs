@@ -16,11 +16,13 @@ const AROUND: usize = 16;
 /// a known waypoint only what is around that is looked at.
 pub(super) fn next_waypoint(waypoints: &[WaypointRow], point: Vec2, heading: f32, known: Option<u32>) -> u32 {
     let ahead = direction(heading);
-    let (mut nearest, mut least) = (1, (true, f32::INFINITY));
-    for (index, pair) in waypoints.windows(2).enumerate() {
-        if known.is_some_and(|known| AROUND < (known as usize).abs_diff(index + 1)) {
-            continue;
-        }
+    let last = waypoints.len() - 1;
+    let [low, high] = known.map_or([1, last], |known| {
+        let known = (known as usize).clamp(1, last);
+        [known.saturating_sub(AROUND).max(1), (known + AROUND).min(last)]
+    });
+    let (mut nearest, mut least) = (low, (true, f32::INFINITY));
+    for (index, pair) in waypoints.windows(2).enumerate().take(high).skip(low - 1) {
         let [from, to] = [pair[0].position, pair[1].position];
         let leads_away = (to - from).dot(ahead) <= 0.0;
         let candidate = (leads_away, distance_to_segment(point, from, to));
@@ -30,7 +32,7 @@ pub(super) fn next_waypoint(waypoints: &[WaypointRow], point: Vec2, heading: f32
     }
     // In a bend the lines through the waypoints, which say what was passed, do not bound what is nearest to a segment.
     let beyond = |waypoint: &WaypointRow| (point - waypoint.position).dot(waypoint.direction);
-    while 1 < nearest && beyond(&waypoints[nearest - 1]) < -ON_WAYPOINT {
+    while low < nearest && beyond(&waypoints[nearest - 1]) < -ON_WAYPOINT {
         nearest -= 1;
     }
     let stands_on_it = waypoints.get(nearest).is_some_and(|waypoint| beyond(waypoint).abs() <= ON_WAYPOINT);

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use offtrack::layout::{Column, Ended, Stream};
+use offtrack::simulator::Tally;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -54,10 +55,18 @@ impl Batch {
         state.look()
     }
 
+    /// Sums over all steps.
+    pub(super) fn sums(&self) -> PyResult<Tally> {
+        let state = self.state()?;
+        state.check_process(&self.device)?;
+        state.tally()
+    }
+
     /// Counts on from the sums of another batch's tally in the same world, and tells the episodes that its last step
     /// ended.
     pub(super) fn take_up(&self, sums: &[i64], ends: Option<GivenEnds>) -> PyResult<()> {
         let mut state = self.state()?;
+        state.check_process(&self.device)?;
         let before = state.simulator.tally().map_err(|error| errors::of_simulator(&error))?;
         if sums.len() != before.sums.len() {
             return Err(PyValueError::new_err("progress: the sums of a tally are needed"));

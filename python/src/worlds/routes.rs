@@ -51,6 +51,12 @@ pub fn narrow(scenario: &mut Scenario, split: &str, names: Option<&[String]>) ->
             continue;
         }
         let roundabout = procedural::find(road).map_err(|error| errors::of_reader(&error))?;
+        if scenario.places.iter().any(|place| place.roundabout.name == roundabout.name) {
+            let (name, other) = (offtrack::files::reader::shortened(name, LONGEST_NAME), &roundabout.name);
+            return Err(PyValueError::new_err(format!(
+                "routes: {name:?}; another road of the batch is {other} too: rename one"
+            )));
+        }
         // Routes of a file are named after its stem.
         let renamed =
             names.iter().filter_map(|name| name.strip_prefix(road)).map(|rest| format!("{}{rest}", roundabout.name));
