@@ -178,7 +178,7 @@ function listenToKeys(app) {
 }
 
 /** What the part of the address behind # chooses. */
-function chosenByAddress(facts) {
+function chosenByAddress(facts, first) {
   const asked = new URLSearchParams(location.hash.slice(1)), chosen = {};
   const number = (name, most) => {
     const value = Number(asked.get(name) ?? NaN);
@@ -189,7 +189,7 @@ function chosenByAddress(facts) {
   number("seed", 2 ** 32 - 1);
   const world = facts.worlds.findIndex(({ name }) => name === asked.get("benchmark"));
   if (0 <= world) chosen.world = world;
-  const { roads, splits } = facts.worlds[chosen.world ?? 0];
+  const { roads, splits } = facts.worlds[chosen.world ?? first];
   const road = roads.findIndex(({ name }) => name === asked.get("road"));
   if (0 <= road) chosen.road = road;
   else if (Object.hasOwn(splits, asked.get("road"))) chosen.road = asked.get("road");

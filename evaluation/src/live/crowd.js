@@ -77,12 +77,16 @@ class Crowd {
 
   /** Keeps a step of the followed truck. */
   add(row) {
+    // One that has not set out is nowhere.
+    if (row.truck.held === 1 && row.truck.steps === 0) return;
     const before = this.steps.at(-1);
     if (before && before.episode !== row.truck.episode) this.steps = [];
-    const { position, heading, episode } = row.truck, trailer = this.trailerOf(row.truck), { wheelbase } = this.rigOf(row.truck);
-    const front = [Math.cos, Math.sin].map((along, axis) => position[axis] + wheelbase * along(heading));
-    this.steps.push({ row, episode, points: [...position, ...trailer], front, trailer });
-    this.steps.at(-1).offTracking = offTrackingAt(this.steps);
+    const { position, heading, episode } = row.truck, trailer = this.trailerOf(row.truck), rig = this.rigOf(row.truck);
+    const front = [Math.cos, Math.sin].map((along, axis) => position[axis] + rig.wheelbase * along(heading));
+    const last = this.steps.at(-1);
+    const way = last ? last.way + Math.hypot(front[0] - last.front[0], front[1] - last.front[1]) : 0;
+    this.steps.push({ row, episode, points: [...position, ...trailer], front, trailer, way });
+    this.steps.at(-1).offTracking = offTrackingAt(this.steps, rig);
     if (MOST_STEPS < this.steps.length) this.steps.shift();
   }
 
@@ -159,18 +163,21 @@ class Crowd {
   }
 }
 
-/** How far the trailer's axles are from the path of the tractor's front axle, over the steps so far (m); null until
- * they have come to where it begins. */
-function offTrackingAt(steps) {
-  const [x, y] = steps.at(-1).trailer;
-  // A trailer follows some 15 m behind at most: the last steps hold its way.
-  const path = steps.slice(-120).map(({ front }) => front);
-  let least = Infinity, isStart = false;
-  for (let n = 1; n < path.length; n++) {
-    const [ax, ay] = path[n - 1], [bx, by] = path[n], [dx, dy] = [bx - ax, by - ay];
+/** How far the trailer's axles are from the path of the tractor's front axle, as evaluations have it (m); null where the
+ * path that is known does not reach back to them. */
+function offTrackingAt(steps, { wheelbase, trailer_wheelbase }) {
+  const { trailer: [x, y], way } = steps.at(-1), longest = 2 * (wheelbase + trailer_wheelbase);
+  const first = steps.findLastIndex((step) => longest < way - step.way), path = steps.slice(Math.max(first, 0));
+  const { front, row: { truck } } = path[0], begins = first < 0 && truck.steps === 0;
+  // Before its start a truck came straight on.
+  const before = begins ? [[Math.cos, Math.sin].map((along, axis) => front[axis] - longest * along(truck.heading))] : [];
+  const points = [...before, ...path.map((step) => step.front)];
+  let least = Infinity, isOutside = true;
+  for (let n = 1; n < points.length; n++) {
+    const [ax, ay] = points[n - 1], [bx, by] = points[n], [dx, dy] = [bx - ax, by - ay];
     const at = Math.min(Math.max(((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy || 1e-9), 0), 1);
     const away = Math.hypot(ax + at * dx - x, ay + at * dy - y);
-    if (away < least) [least, isStart] = [away, n === 1 && at === 0];
+    if (away < least) [least, isOutside] = [away, n === 1 && at === 0];
   }
-  return isStart || least === Infinity ? null : least;
+  return isOutside ? null : least;
 }

@@ -71,8 +71,7 @@ class Followed {
       const node = byId("readings").children[index], values = thinned(steps.map((step) => value(step, side)), MOST_SPARKS);
       if (values.length === 0) return;
       node.querySelector("dd").textContent = words(values.at(-1));
-      const known = values.filter((value) => value !== null);
-      node.querySelector("svg").replaceWith(sparkline(known.length === 0 ? [0, 0] : known));
+      node.querySelector("svg").replaceWith(sparkline(values));
     });
     const around = world.facts.traffic?.observed ? row.around : [];
     const seen = [...row.observation, ...[...row.extras].slice(0, world.facts.extras.length), ...around];

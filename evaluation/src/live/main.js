@@ -4,5 +4,5 @@
 const live = await readLive();
 const page = new App(live);
 window.offtrackLive = page;
-await page.start(chosenByAddress(live.facts));
+await page.start(chosenByAddress(live.facts, page.chosen.world));
 page.baker.driveByAddress();

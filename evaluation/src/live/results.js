@@ -62,7 +62,7 @@ function showEnds(live, crowds, reported) {
   const out = begun < n ? `${whole(begun)} of ${whole(n)} trucks have set out. ` : "";
   const ended = counted.map(({ episodes }) => whole(episodes)).join(" and ");
   const yours = crowds.reduce((sum, { driven }) => sum + driven.size, 0);
-  const byYou = yours === 0 ? "" : ` You drove in ${whole(yours)}, which count here and in the success.`;
+  const byYou = yours === 0 ? "" : ` Those that you drive in count, too: ${whole(yours)} so far.`;
   byId("ends-note").textContent = `${out}Episodes that have ended: ${ended}.${byYou}`;
 }
 

@@ -60,8 +60,10 @@ class Pairs {
     this.playing = playing;
     showPlaying(byId("play"), playing);
     let before = performance.now();
+    const turn = (this.turnOfPlay = {});
     const tick = () => {
-      if (!this.playing) return;
+      // Another press has begun another loop.
+      if (!this.playing || turn !== this.turnOfPlay) return;
       const time = performance.now();
       this.seek(this.frame + (time - before) / 1000 / this.page.ground.step);
       before = time;

@@ -79,7 +79,9 @@ function colours() {
 function sparkline(values) {
   const low = Math.min(...values, 0), high = Math.max(...values, low + 1e-3), last = Math.max(values.length - 1, 1);
   const y = (value) => 21 - (20 * (value - low)) / (high - low);
-  const path = values.map((value, frame) => `${frame === 0 ? "M" : "L"}${((100 * frame) / last).toFixed(2)} ${y(value).toFixed(2)}`).join("");
+  // Where nothing is known there is no line.
+  const isKnown = (frame) => (values[frame] ?? null) !== null;
+  const path = values.map((value, frame) => isKnown(frame) ? `${isKnown(frame - 1) ? "L" : "M"}${((100 * frame) / last).toFixed(2)} ${y(value).toFixed(2)}` : "").join("");
   return svg("svg", { viewBox: "0 0 100 22", preserveAspectRatio: "none", "aria-hidden": "true" },
     svg("line", { class: "grid", x1: 0, x2: 100, y1: y(0), y2: y(0), "vector-effect": "non-scaling-stroke" }),
     svg("path", { class: "curve", d: path, "vector-effect": "non-scaling-stroke" }),

@@ -136,8 +136,10 @@ class Replay {
     showPlaying(byId("play"), playing);
     if (!playing) return;
     let before = performance.now();
+    const turn = (this.turnOfPlay = {});
     const tick = () => {
-      if (!this.playing) return;
+      // Another press has begun another loop.
+      if (!this.playing || turn !== this.turnOfPlay) return;
       const time = performance.now(), passed = (time - before) / 1000;
       before = time;
       this.seek(this.frame + (passed * Number(byId("rate").value)) / this.page.ground.step);
