@@ -249,7 +249,7 @@ impl Vehicle {
         let steady = self.single_track().at_tractor_radius(axle(wheelbase + front_overhang, width))?;
         let trailer = &self.trailer;
         let own = axle(trailer.wheelbase + trailer.kingpin_to_front, trailer.width);
-        Some(steady.trailer_radius.min(own) - 0.5 * trailer.width)
+        (0.0 < own).then(|| steady.trailer_radius.min(own) - 0.5 * trailer.width)
     }
 
     /// The constants that the stages need, for one of the loads and sub-steps of `substep` (s). `steer_max` replaces

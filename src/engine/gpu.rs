@@ -115,11 +115,7 @@ impl Device {
         let mut contents = Vec::with_capacity(slices.len());
         while contents.len() < slices.len() {
             let rest = &slices[contents.len()..];
-            let sums = rest.iter().scan(0u64, |sum, slice| {
-                *sum += slice.size;
-                Some(*sum)
-            });
-            let n = sums.take_while(|&sum| sum <= largest).count().max(1);
+            let n = n_fitting(rest.iter().map(|slice| slice.size), largest);
             contents.extend(self.read_at_once(&rest[..n])?);
         }
         Ok(contents)
@@ -193,5 +189,32 @@ impl Device {
 
     fn broken(&self, message: String) -> Error {
         Error::Broken { adapter: self.adapter.get_info().name, message }
+    }
+}
+
+/// How many of these sizes, the first ones, are at most `largest` together; at least one.
+fn n_fitting(sizes: impl Iterator<Item = u64>, largest: u64) -> usize {
+    let mut sum = 0u64;
+    let fits = |size: &u64| {
+        sum = sum.saturating_add(*size);
+        sum <= largest
+    };
+    sizes.take_while(fits).count().max(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_read_at_once_fits_into_one_buffer_and_all_is_read() {
+        let sizes = [40, 60, 1, 100, 99, 2, u64::MAX];
+        let (mut read, mut parts) = (0, Vec::new());
+        while read < sizes.len() {
+            let n = n_fitting(sizes[read..].iter().copied(), 100);
+            parts.push(&sizes[read..read + n]);
+            read += n;
+        }
+        assert_eq!(parts, [&[40, 60][..], &[1], &[100], &[99], &[2], &[u64::MAX]]);
     }
 }

@@ -204,10 +204,15 @@ impl Car {
 
     /// The ground that its units cover: one, or a tractor and its trailer.
     pub fn outlines(&self, network: &Network) -> impl Iterator<Item = Outline> + Clone + use<> {
-        let Some(large) = self.large() else { return [Some(self.outline_of_car(network)), None].into_iter().flatten() };
+        self.units(network).into_iter().flatten()
+    }
+
+    /// The same, of which the second is none where there is one unit.
+    pub fn units(&self, network: &Network) -> [Option<Outline>; 2] {
+        let Some(large) = self.large() else { return [Some(self.outline_of_car(network)), None] };
         let shape = large.shape();
-        let tractor = shape.has_tractor.then(|| self.tractor(network, large));
-        [tractor, Some(self.last_unit(network, large, &shape))].into_iter().flatten()
+        let last = Some(self.last_unit(network, large, &shape));
+        if shape.has_tractor { [Some(self.tractor(network, large)), last] } else { [last, None] }
     }
 
     /// A car: both axles are on the path, so in bends its ends swing out and its middle cuts in.

@@ -10,7 +10,7 @@ use offtrack::physics::seen_by_vehicles;
 use offtrack::scenario::{Scenario, Split};
 use offtrack::simulator::{RouteChoice, Simulator};
 use offtrack::traffic::units::metres;
-use offtrack::traffic::{Car, Contact, Row};
+use offtrack::traffic::{Car, Contact, ENTERED_BEFORE, Row};
 use offtrack::world::World;
 
 use crate::left_hand;
@@ -319,4 +319,38 @@ fn vehicles_can_only_be_observed_where_there_are_some() {
     let mut scenario = Scenario::named("attard2023").unwrap();
     scenario.observes_vehicles = true;
     assert!(World::bake(&scenario).unwrap_err().to_string().starts_with("observes_vehicles: true; with traffic"));
+}
+
+#[test]
+fn a_truck_that_begins_beyond_its_line_has_not_just_entered_and_goes_on_from_there() {
+    let text = Scenario::text_of("attard2023").unwrap() + "\n[start]\nalong = 0.9\n\n[traffic]\ndemand = [900]\n";
+    let scenario = Scenario::parse("along", &text, None, &Loading::PLAIN).unwrap();
+    let world = Arc::new(World::bake(&scenario).unwrap());
+    let choice = RouteChoice::Drawn(scenario.split(Split::Train).to_vec());
+    let mut simulator = Simulator::new(world, 256, 3, choice).unwrap();
+    simulator.steps_at_random(1);
+    let entered = |simulator: &Simulator| rows(simulator).iter().map(|row| row.entered).collect::<Vec<u32>>();
+    let first = entered(&simulator);
+    let n_before = first.iter().filter(|&&entered| entered == ENTERED_BEFORE).count();
+    assert!(50 < n_before && first.iter().all(|&entered| [0, ENTERED_BEFORE].contains(&entered)), "{n_before}");
+    // In its second step it is a long time ago, and a state with it is one.
+    assert!(30 <= 2u32.wrapping_sub(ENTERED_BEFORE));
+    let kept = simulator.batch().clone();
+    simulator.restore(|column| Some(kept.column(column))).unwrap();
+    assert_eq!(entered(&simulator), first);
+}
+
+#[test]
+fn a_large_vehicle_in_the_state_of_a_world_that_has_none_is_refused() {
+    let (scenario, world) = with_traffic("demand = [1500]\n");
+    let choice = RouteChoice::Drawn(scenario.split(Split::Train).to_vec());
+    let mut simulator = Simulator::new(world, 8, 3, choice).unwrap();
+    let kept = simulator.batch().clone();
+    let mut cars = kept.cars.clone();
+    let slot = Row::of(&cars[2]).cars.iter().position(Car::is_there).unwrap();
+    // A bus, by the upper bits of its style.
+    Row::of_mut(&mut cars[2]).cars[slot].what |= 1 << 18;
+    let changed = |column| Some(if column == Column::Cars { bytemuck::cast_slice(&cars) } else { kept.column(column) });
+    let message = simulator.restore(changed).unwrap_err().to_string();
+    assert!(message.starts_with(&format!("cars[2][{slot}].large: 1; must lie in 0..0")), "{message}");
 }

@@ -208,16 +208,13 @@ impl Observing<'_> {
     /// The cars of a row, as they are observed.
     fn cars(&self, cars: &[Car]) -> impl Iterator<Item = Other> {
         let is_near = may_be_within(self.network, &self.units, NEAR_SCALE);
-        cars.iter().filter(|car| car.is_there()).map(move |car| {
-            let mut units = is_near(car).then(|| car.outlines(self.network)).into_iter().flatten();
-            Other {
-                path: car.path(),
-                station: car.station(),
-                speed: car.speed(),
-                length: car.length(),
-                units: [units.next(), units.next()],
-                car: Some(*car),
-            }
+        cars.iter().filter(|car| car.is_there()).map(move |car| Other {
+            path: car.path(),
+            station: car.station(),
+            speed: car.speed(),
+            length: car.length(),
+            units: if is_near(car) { car.units(self.network) } else { [None; 2] },
+            car: Some(*car),
         })
     }
 

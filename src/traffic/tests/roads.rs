@@ -168,6 +168,10 @@ fn a_junction_without_a_ring_takes_900_cars_an_hour_and_no_more_and_no_flow_is_n
     let crossing = Network::bake(&map("town03-crossing")).unwrap();
     let of = |total: f64| Demand::new(&crossing, &Demand::even(&crossing, total), Mix::default());
     assert!(of(demand::MOST_WITHOUT_RING).is_ok());
+    // Of parts whose sum is more in the last bit.
+    let mut flows = vec![0.0; crossing.paths.len()];
+    flows[..2].copy_from_slice(&[899.9, 0.100_000_000_000_1]);
+    assert!(900.0 < flows.iter().sum::<f64>() && Demand::new(&crossing, &flows, Mix::default()).is_ok());
     let error = of(1500.0).unwrap_err();
     assert!(matches!(error, Error::NoRing { .. }), "{error}");
     assert_eq!(

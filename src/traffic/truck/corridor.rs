@@ -69,6 +69,27 @@ impl Points {
         }
         points
     }
+
+    /// The first of `n` points that something is nearer to than there is room, by its squared distance from each (m²);
+    /// beside the car there is room of at most `most` (m).
+    fn first_within(
+        &self,
+        squared: &[f32; CORRIDOR_SAMPLES],
+        n: usize,
+        most: f32,
+        room: impl Fn(usize) -> f32,
+    ) -> Option<usize> {
+        // Most corridors are free, which is told without a branch.
+        let mut is_any = false;
+        for (squared, half_width) in squared.iter().zip(&self.half_widths) {
+            let room = half_width + most;
+            is_any |= *squared < room * room;
+        }
+        if !is_any {
+            return None;
+        }
+        (0..n).find(|&index| squared[index] < room(index) * room(index))
+    }
 }
 
 /// Squared distance of each point to the nearest of some rectangles, 0 inside them (m²), but for those that the
@@ -117,7 +138,7 @@ pub(super) fn mind(view: &View, driver: &mut Driver) {
     let beside = |index: usize| if station(index) < car.station() { ROOM_AT_FRONT } else { CORRIDOR_ROOM };
     let room = |index: usize| points.half_widths[index] + beside(index);
     let now = to_nearest(&points, &view.now, at_front);
-    let leader = (0..samples.len()).find(|&index| now[index] < room(index) * room(index));
+    let leader = points.first_within(&now, samples.len(), CORRIDOR_ROOM, room);
     if let Some(index) = leader {
         let rear = length(station(index) - BEFORE_SAMPLE);
         let speed = view.speed_along(&samples[index]);
@@ -133,7 +154,7 @@ pub(super) fn mind(view: &View, driver: &mut Driver) {
         let later = to_nearest(&points, &view.later, at_front);
         let room = |index: usize| points.half_widths[index] + ROOM_LATER;
         let before = leader.unwrap_or(samples.len());
-        if let Some(index) = (0..before).find(|&index| later[index] < room(index) * room(index)) {
+        if let Some(index) = points.first_within(&later, before, ROOM_LATER, room) {
             slow(view, driver, length(station(index) - BEFORE_SAMPLE));
         }
     }
@@ -179,7 +200,7 @@ pub(super) fn ahead(view: &View, network: &Network, car: &Car) -> Option<(i32, i
     let points = Points::of(network, car, 0, samples);
     let now = to_nearest(&points, &view.now, samples[0].position);
     let room = |index: usize| points.half_widths[index] + CORRIDOR_ROOM;
-    let index = (0..samples.len()).find(|&index| now[index] < room(index) * room(index))?;
+    let index = points.first_within(&now, samples.len(), CORRIDOR_ROOM, room)?;
     let speed = view.speed_along(&samples[index]);
     Some((length(index as f32 * SPACING - BEFORE_SAMPLE), speed))
 }
