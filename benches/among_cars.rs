@@ -101,7 +101,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     let Some(file) = file else { return Ok(()) };
     let written = json!({
-        "commit": provenance::commit(),
         "machine": provenance::machine(),
         "what": "a step of 0.1 s, two sub-steps, 29 rays, of a truck on all cores; medians of five turns",
         "times": times_of,
