@@ -19,6 +19,8 @@ const FINE: f64 = 1e-3;
 const FITTED: f64 = 4e-3;
 /// Gaps between gutters that are narrower are solid (m).
 const SLIT: f64 = 0.1;
+/// What is left with a smaller area is none (m²).
+const PINHOLE: f64 = 0.01;
 /// A width is applied at points at most this far apart, and nearer where it does not change linearly (m).
 const SPACING: f64 = 0.5;
 /// Least such distance (m).
@@ -259,7 +261,9 @@ fn left(faces: &Outline, triangles: Vec<Vec<DVec2>>) -> Outline {
     let lanes = lanes.without_slits(SLIT, 0.0);
     let size = |part: &[Vec<[f64; 2]>]| part.iter().map(|contour| signed_area(contour)).sum::<f64>();
     let largest = lanes.parts.iter().max_by(|one, other| size(one).total_cmp(&size(other)));
+    // Triangles side by side leave pinholes between them, which are no islands.
+    let contours = largest.into_iter().flatten().filter(|contour| PINHOLE < signed_area(contour).abs());
     // Rounded corners stay: benchmarks with these edges keep their bits.
-    let loops = largest.into_iter().flatten().map(|contour| bulging_outline(&points(contour), FITTED, f64::INFINITY));
+    let loops = contours.map(|contour| bulging_outline(&points(contour), FITTED, f64::INFINITY));
     Outline::new(loops.filter(|curve| !curve.pieces.is_empty()).collect())
 }

@@ -31,6 +31,31 @@ fn a_gutter_that_is_written_for_every_kerb_is_the_one_gutter() {
 }
 
 #[test]
+fn a_road_with_gutters_of_its_own_has_the_same_islands_whatever_its_bearing() {
+    // The splitter islands' gutters are 0.1 to 0.4 m wide, those of the kerbs at their ends 0.2 to 0.8 m.
+    let corners = "{ along = 28.0, offset = -0.9, radius = 0.31 }, { along = 47.0, offset = 0.05, radius = 0.17 }, \
+                   { along = 28.5, offset = 0.8, radius = 0.29 }";
+    let text = |turn: u32| {
+        let island = [(turn, 0.3), (turn + 180, 0.9)]
+            .map(|(bearing, width)| format!("{{ bearing_deg = {bearing}.0, width = {width} }}"));
+        let ring = format!("gutter = 0.5\nisland_gutter = [{}]\n", island.join(", "));
+        (0..4).fold(with_kerbs_at(9.5).replace("gutter = 0.5\n", &ring), |text, arm| {
+            let kerb = format!("[{{ station = 0.0, width = 0.2 }}, {{ station = 60.0, width = 0.{} }}]", 2 * arm + 2);
+            let own = format!("splitter = [{corners}]\nsplitter_gutter = 0.{}\nkerb_gutter = {kerb}\n", arm + 1);
+            let (before, after) =
+                (format!("= {}.0\nlength = 100.0\n", 90 * arm), format!("= {}.0\nlength", 90 * arm + turn));
+            assert!(text.contains(&before));
+            text.replace(&before, &format!("{after} = 100.0\n{own}"))
+        })
+    };
+    for turn in (0..64).step_by(7) {
+        let edges = read(&text(turn)).unwrap().kerbs(Gutter::Solid);
+        let areas: Vec<f64> = edges.loops.iter().map(Curve::signed_area).collect();
+        assert!(areas.len() == 6 && areas.iter().all(|area| 1.0 < area.abs()), "turned by {turn}: {areas:?}");
+    }
+}
+
+#[test]
 fn each_kerb_has_the_gutter_that_is_written_for_it() {
     let island = "island_gutter = [{ bearing_deg = 0.0, width = 0.0 }, { bearing_deg = 180.0, width = 1.0 }]\n";
     let mouth = "mouth_gutter = [{ bearing_deg = -5.0, width = 0.0 }, { bearing_deg = -4.9, width = 0.5 }, \
