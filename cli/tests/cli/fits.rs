@@ -266,9 +266,12 @@ fn a_drawing_becomes_a_road_through_which_trucks_are_driven_at_its_place_in_the_
     // What one program writes: kerbs and lanes of 16m.
     succeed(&fits(&place, &EASY));
     let (drawing, road) = (place.text("fits/16m-eu_4x2_13m6.dxf"), place.text("site.outline.toml"));
-    let said = refusal(&offtrack(&["import", &drawing, "-o", &road]), 2);
+    let text = std::fs::read_to_string(&drawing).unwrap();
+    assert!(text.contains("$INSUNITS"));
+    std::fs::write(place.file("no-unit.dxf"), text.replace("$INSUNITS", "$LUNITS")).unwrap();
+    let said = refusal(&offtrack(&["import", &place.text("no-unit.dxf"), "-o", &road]), 2);
     assert!(said.contains("--unit m, mm, cm, ft, us-ft or in"), "{said}");
-    let output = offtrack(&["import", &drawing, "--unit", "m", "-o", &road]);
+    let output = offtrack(&["import", &drawing, "-o", &road]);
     succeed(&output);
     let said = String::from_utf8(output.stdout).unwrap();
     assert!(said.contains("4 arms, 20 routes") && said.contains("note: "), "{said}");
