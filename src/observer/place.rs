@@ -6,8 +6,9 @@ use crate::engine::cpu::follow::distance_to_segment;
 use crate::layout::WaypointRow;
 use crate::layout::angle::direction;
 
-/// A truck this little before the line through a waypoint stands on it, and has passed it, as the simulator begins (m).
-const ON_WAYPOINT: f32 = 2e-4;
+/// A truck this little before the line through a waypoint stands on it, and has passed it, as the simulator begins: what
+/// rounding leaves of a position (m).
+const ON_WAYPOINT: f32 = 2e-5;
 /// Waypoints before and behind a known one, among which the next is looked for.
 const AROUND: usize = 16;
 
