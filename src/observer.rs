@@ -147,6 +147,8 @@ impl Observer {
 
     /// Begins an episode at any place along the route, with the wheels straight and the truck's speed as its target, as
     /// the simulator begins one: the clock begins, what lies behind counts as passed, and the start is not judged.
+    /// Where a truck stands exactly at a waypoint, rounding decides whether that or the one after it is the next.
+    ///
     /// A route may pass a place twice, such as one that leads round a ring and back: then the nearer lane is taken, and
     /// [`begin_near`](Observer::begin_near) says which is meant.
     ///

@@ -6,9 +6,6 @@ use crate::engine::cpu::follow::distance_to_segment;
 use crate::layout::WaypointRow;
 use crate::layout::angle::direction;
 
-/// A truck this little before the line through a waypoint stands on it, and has passed it, as the simulator begins: what
-/// rounding leaves of a position (m).
-const ON_WAYPOINT: f32 = 2e-5;
 /// Waypoints before and behind a known one, among which the next is looked for.
 const AROUND: usize = 16;
 
@@ -32,10 +29,9 @@ pub(super) fn next_waypoint(waypoints: &[WaypointRow], point: Vec2, heading: f32
         }
     }
     // In a bend the lines through the waypoints, which say what was passed, do not bound what is nearest to a segment.
-    let beyond = |waypoint: &WaypointRow| (point - waypoint.position).dot(waypoint.direction);
-    while low < nearest && beyond(&waypoints[nearest - 1]) < -ON_WAYPOINT {
+    let is_before = |waypoint: &WaypointRow| (point - waypoint.position).dot(waypoint.direction) < 0.0;
+    while low < nearest && is_before(&waypoints[nearest - 1]) {
         nearest -= 1;
     }
-    let stands_on_it = waypoints.get(nearest).is_some_and(|waypoint| beyond(waypoint).abs() <= ON_WAYPOINT);
-    (nearest + usize::from(stands_on_it)) as u32
+    nearest as u32
 }

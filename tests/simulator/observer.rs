@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec2;
 use offtrack::layout::{Control, Ended, Truck};
 use offtrack::observer::{Observed, Observer, Pose, State, Telemetry};
-use offtrack::scenario::{Scenario, Split};
+use offtrack::scenario::Scenario;
 use offtrack::simulator::{Batch, Error, RouteChoice, Simulator};
 use offtrack::world::World;
 
@@ -260,23 +260,6 @@ fn a_truck_where_a_route_passes_a_place_twice_begins_near_the_waypoint_that_is_k
     let error = observer.begin_near(&pose, 9_999).unwrap_err().to_string();
     assert!(error.contains("waypoint") && error.contains("9999"), "{error}");
     assert_eq!(observer.state(), before);
-}
-
-#[test]
-fn a_truck_that_stands_on_a_waypoint_has_passed_it() {
-    let mut scenario = Scenario::named("random2026").unwrap();
-    scenario.start_along = 0.9;
-    let world = Arc::new(World::bake(&scenario).unwrap());
-    let choice = RouteChoice::Drawn(scenario.split(Split::Test).to_vec());
-    let simulator = Simulator::new(world.clone(), 2_000, 8, choice).unwrap();
-    let batch = simulator.batch();
-    let next = |(env, truck): (usize, &Truck)| {
-        let mut observer = Observer::new(world.clone(), truck.route, truck.vehicle).unwrap();
-        let seen = observer.begin(&pose(&observer, truck)).unwrap();
-        (seen.progress.waypoint, batch.progress[env].waypoint)
-    };
-    let others: Vec<_> = batch.truck.iter().enumerate().map(next).filter(|(seen, own)| seen != own).collect();
-    assert_eq!(others, []);
 }
 
 #[test]
