@@ -85,7 +85,12 @@ impl Place {
     /// Index of a route by its name, which stands in this argument; `known` says of whom the names in the error are.
     pub fn route(&self, argument: &str, name: &str, known: &str) -> PyResult<u32> {
         let names = &self.world.route_names;
-        let found = names.iter().position(|route| route == name);
+        // Routes of a file are named after its stem.
+        let of_file = name.rsplit_once(".toml/").and_then(|(path, rest)| {
+            let stem = std::path::Path::new(path).file_name()?.to_str()?;
+            Some(format!("{stem}/{rest}"))
+        });
+        let found = names.iter().position(|route| route == name || Some(route) == of_file.as_ref());
         found.map(|index| index as u32).ok_or_else(|| {
             let list = shortened(&names.join(", "), 600);
             PyValueError::new_err(format!("{argument}: {name:?}; {known} {list}"))

@@ -170,7 +170,7 @@ def test_a_pickle_of_a_batch_on_a_road_of_a_file_is_read_in_another_folder(
         Batch("attard2023", 2, routes=["./16m.toml"])
     monkeypatch.chdir("/")
     there, other = pickle.loads(kept)
-    assert there.route_names == batch.route_names and (there.observation == batch.observation).all()
+    assert there.route_names == batch.route_names and (there.observation() == batch.observation()).all()
     assert other.waypoints(other.routes[0]).shape == observer.waypoints(observer.routes[0]).shape
 
 
