@@ -160,8 +160,8 @@ impl Observer {
     }
 
     /// The same where it is known near which waypoint the truck is, by its index along the route: such as the one that
-    /// was the next of an episode that goes on. The next one is looked for from 16 waypoints before it to 16 behind it; a
-    /// truck that is elsewhere has strayed at its next observation.
+    /// was the next of an episode that goes on. The next one is looked for from 16 waypoints before it to 16 behind it;
+    /// a truck that is elsewhere has strayed at its next observation.
     ///
     /// # Errors
     ///

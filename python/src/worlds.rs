@@ -17,6 +17,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::errors;
+use routes::RoadFile;
 pub use routes::is_of;
 
 /// Most worlds that are kept for the next batch.
@@ -37,6 +38,8 @@ pub struct Place {
     pub routes: Vec<u32>,
     /// Steps after which an episode is timed out in any case, where the caller says so.
     pub max_episode_steps: Option<u32>,
+    /// Files whose roads were added to the benchmark's.
+    files: Vec<RoadFile>,
     /// The world's fingerprint, once it was asked for.
     fingerprint: Arc<OnceLock<u32>>,
 }
@@ -85,12 +88,9 @@ impl Place {
     /// Index of a route by its name, which stands in this argument; `known` says of whom the names in the error are.
     pub fn route(&self, argument: &str, name: &str, known: &str) -> PyResult<u32> {
         let names = &self.world.route_names;
-        // Routes of a file are named after its stem.
-        let of_file = name.rsplit_once(".toml/").and_then(|(path, rest)| {
-            let stem = std::path::Path::new(path).file_name()?.to_str()?;
-            Some(format!("{stem}/{rest}"))
-        });
-        let found = names.iter().position(|route| route == name || Some(route) == of_file.as_ref());
+        let of_file = self.files.iter().find_map(|file| file.renamed(name));
+        let name_here = of_file.as_deref().unwrap_or(name);
+        let found = names.iter().position(|route| route == name_here);
         found.map(|index| index as u32).ok_or_else(|| {
             let list = shortened(&names.join(", "), 600);
             PyValueError::new_err(format!("{argument}: {name:?}; {known} {list}"))
@@ -111,7 +111,7 @@ impl Place {
         let cache = Cache::of_user();
         let loading = Loading { cache: cache.as_ref(), stop, ..Loading::PLAIN };
         let mut scenario = asked.scenario.load(&loading)?;
-        let split = routes::narrow(&mut scenario, asked.split, asked.routes)?;
+        let (split, files) = routes::narrow(&mut scenario, asked.split, asked.routes)?;
         let scenario = change(scenario);
         let limit = asked.max_episode_steps;
         // Held while a world is baked, so that two threads do not bake the same one.
@@ -119,7 +119,7 @@ impl Place {
         let known =
             |place: &&Place| (place.max_episode_steps, place.split) == (limit, split) && *place.scenario == scenario;
         if let Some(place) = baked.iter().find(known) {
-            return Ok(place.clone());
+            return Ok(Place { files, ..place.clone() });
         }
         let same = |place: &&Place| place.max_episode_steps.is_none() && *place.scenario == scenario;
         let mut world = match baked.iter().find(same) {
@@ -133,7 +133,7 @@ impl Place {
         let routes = Split::ALL.iter().flat_map(|&split| scenario.split(split)).copied().collect();
         let (scenario, world) = (Arc::new(scenario), Arc::new(world));
         let fingerprint = Arc::default();
-        let place = Place { scenario, world, split, routes, max_episode_steps: limit, fingerprint };
+        let place = Place { scenario, world, split, routes, max_episode_steps: limit, files, fingerprint };
         if baked.len() == KEPT {
             baked.remove(0);
         }

@@ -175,19 +175,20 @@ pub(super) fn shares_arms(world: &World, row: &Row, route: u32) -> bool {
     if row.mates.is_empty() {
         return false;
     }
-    let add = |arms: u32, route: u32| arms | 1 << begins_in(world, route)[0];
     let road = |route: u32| world.routes[route as usize].roundabout;
-    let arms = match row.choice {
-        RouteChoice::Fixed(routes) => row.mates.iter().map(|mate| routes[mate.env as usize]).fold(0, add),
-        RouteChoice::Drawn(routes) => routes.iter().copied().filter(|&other| road(other) == road(route)).fold(0, add),
-    };
-    (arms.count_ones() as usize) < row.mates.len()
+    let n = row.mates.len();
+    match row.choice {
+        RouteChoice::Fixed(routes) => exceed_arms(world, n, row.mates.iter().map(|mate| routes[mate.env as usize])),
+        RouteChoice::Drawn(routes) => {
+            exceed_arms(world, n, routes.iter().copied().filter(|&other| road(other) == road(route)))
+        }
+    }
 }
 
-/// Whether some of these routes begin on one arm.
-pub(crate) fn share_arms(world: &World, routes: impl ExactSizeIterator<Item = u32>) -> bool {
-    let n = routes.len();
-    (routes.fold(0u32, |arms, route| arms | 1 << begins_in(world, route)[0]).count_ones() as usize) < n
+/// Whether there are more trucks than arms on which these routes begin.
+pub(crate) fn exceed_arms(world: &World, n_trucks: usize, routes: impl Iterator<Item = u32>) -> bool {
+    let arms = routes.fold(0u32, |arms, route| arms | 1 << begins_in(world, route)[0]);
+    (arms.count_ones() as usize) < n_trucks
 }
 
 /// Where a route begins among other vehicles: index of the arm, and of the lane among all of the road; zeros where

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::engine::group::{n_lanes, share_arms};
+use crate::engine::group::{exceed_arms, n_lanes};
 use crate::engine::{Error, RouteChoice};
 use crate::layout::{BEGINS, BeginRow, HAS_ROUTE, IS_CENTRED, IS_FIRST, Start};
 use crate::world::World;
@@ -91,7 +91,7 @@ pub(super) fn check_begins(world: &World, begins: &[BeginRow]) -> Result<(), Err
 pub(super) fn centre_beside(world: &World, begins: &mut [BeginRow]) {
     let group = world.group();
     for begins in begins.chunks_mut(group).filter(|begins| 1 < group && begins[0].what & HAS_ROUTE != 0) {
-        if share_arms(world, begins.iter().map(|begin| begin.route)) {
+        if exceed_arms(world, group, begins.iter().map(|begin| begin.route)) {
             begins.iter_mut().for_each(|begin| begin.what |= IS_CENTRED);
         }
     }

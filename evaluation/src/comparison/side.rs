@@ -66,15 +66,14 @@ impl Evaluated {
         let wrong = |what: String| Error::contents(file, format!("{what}; {again}"));
         let value: serde_json::Value = serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;
         if let Some(key) = ["outcomes", "asked"].into_iter().find(|&key| value.get(key).is_none()) {
-            let what = match value.get("evaluation").or_else(|| value.get("runs")) {
-                Some(_) if value.get("runs").is_some() => {
-                    let what = "is the table of a training's seeds: evaluate the policy.safetensors of each";
-                    return Err(Error::contents(file, format!("{what} with `offtrack evaluate --json`")));
-                }
+            if value.get("runs").is_some() {
+                let what = "is the table of a training's seeds: evaluate the policy.safetensors of each";
+                return Err(Error::contents(file, format!("{what} with `offtrack evaluate --json`")));
+            }
+            return Err(wrong(match value.get("evaluation") {
                 Some(_) => "is the report of a training run, which has no outcomes of single episodes".to_owned(),
                 None => format!("{key}: is missing, as in reports of earlier versions"),
-            };
-            return Err(wrong(what));
+            }));
         }
         // From the text: its message has line and column.
         let evaluated: Evaluated = serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;

@@ -49,8 +49,8 @@ pub struct Validations {
     pub episodes: u64,
     /// Validations that came due; of several at once one was made.
     pub times: u64,
-    /// The best validation, whose policy is kept; of equal ones the last, and of a refinement the last. A refinement that
-    /// was stopped keeps its latest policy, which no validation has seen.
+    /// The best validation, whose policy is kept; of equal ones the last, and of a refinement the last. A refinement
+    /// that was stopped keeps its latest policy, which no validation has seen.
     pub best: Validated,
     /// Lower end of the 95 % Wilson interval of the best validation's success.
     pub best_success_low: f64,

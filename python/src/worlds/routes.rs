@@ -1,5 +1,6 @@
 //! The routes that are to be driven: a split, or routes by their names, which are those of the command line.
 
+use offtrack::files::reader::shortened;
 use offtrack::files::shipped::Kind;
 use offtrack::map::procedural;
 use offtrack::scenario::{Scenario, Split};
@@ -13,10 +14,30 @@ const LONGEST_LIST: usize = 600;
 /// Most characters of a name in a message.
 const LONGEST_NAME: usize = 100;
 
+/// A road that the benchmark does not have, such as one of a file.
+#[derive(Debug, Clone)]
+pub struct RoadFile {
+    /// As the caller names it.
+    path: String,
+    /// As its routes are named: after the stem of a file.
+    name: String,
+}
+
+impl RoadFile {
+    /// The name of a route, or of the road, that is named by the file's path.
+    pub fn renamed(&self, name: &str) -> Option<String> {
+        name.strip_prefix(&self.path).map(|rest| format!("{}{rest}", self.name))
+    }
+}
+
 /// Leaves the scenario the routes of a split, or those of any split that `names` has: each a route, or all routes of a
 /// roundabout. One that the benchmark does not have is added, as `wide/7/12` is. Returns the name of the split that all
-/// of these are of, or `routes`.
-pub fn narrow(scenario: &mut Scenario, split: &str, names: Option<&[String]>) -> PyResult<&'static str> {
+/// of these are of, or `routes`, and the files that were added.
+pub fn narrow(
+    scenario: &mut Scenario,
+    split: &str,
+    names: Option<&[String]>,
+) -> PyResult<(&'static str, Vec<RoadFile>)> {
     let Some(split) = Split::ALL.into_iter().find(|known| known.name() == split) else {
         let known = Split::ALL.map(Split::name).join(", ");
         return Err(PyValueError::new_err(format!("split: {split:?}; must be one of {known}")));
@@ -32,7 +53,7 @@ pub fn narrow(scenario: &mut Scenario, split: &str, names: Option<&[String]>) ->
             )));
         }
         scenario.keep(&[split]);
-        return Ok(split.name());
+        return Ok((split.name(), Vec::new()));
     };
     if names.is_empty() {
         return Err(PyValueError::new_err(
@@ -41,7 +62,7 @@ pub fn narrow(scenario: &mut Scenario, split: &str, names: Option<&[String]>) ->
     }
     let mut wanted = names.to_vec();
     let of_benchmark = known(scenario);
-    let mut added: Vec<&str> = Vec::new();
+    let (mut added, mut files): (Vec<&str>, Vec<RoadFile>) = Default::default();
     for name in names {
         let road = match road_of(name) {
             Some(road) if !of_benchmark.iter().any(|route| is_of(route, name)) => road,
@@ -52,15 +73,14 @@ pub fn narrow(scenario: &mut Scenario, split: &str, names: Option<&[String]>) ->
         }
         let roundabout = procedural::find(road).map_err(|error| errors::of_reader(&error))?;
         if scenario.places.iter().any(|place| place.roundabout.name == roundabout.name) {
-            let (name, other) = (offtrack::files::reader::shortened(name, LONGEST_NAME), &roundabout.name);
+            let (name, other) = (shortened(name, LONGEST_NAME), &roundabout.name);
             return Err(PyValueError::new_err(format!(
                 "routes: {name:?}; another road of the batch is {other} too: rename one"
             )));
         }
-        // Routes of a file are named after its stem.
-        let renamed =
-            names.iter().filter_map(|name| name.strip_prefix(road)).map(|rest| format!("{}{rest}", roundabout.name));
-        wanted.extend(renamed);
+        let file = RoadFile { path: road.to_owned(), name: roundabout.name.clone() };
+        wanted.extend(names.iter().filter_map(|name| file.renamed(name)));
+        files.push(file);
         scenario.add(roundabout, Split::Test).map_err(|error| errors::of_reader(&error))?;
         added.push(road);
     }
@@ -68,8 +88,8 @@ pub fn narrow(scenario: &mut Scenario, split: &str, names: Option<&[String]>) ->
     let is_known = |name: &str| known.iter().any(|route| is_of(route, name));
     let is_file = |name: &str| added.iter().any(|road| name.starts_with(road) && road.ends_with(".toml"));
     if let Some(unknown) = wanted.iter().find(|name| !is_known(name) && !is_file(name)) {
-        let list = offtrack::files::reader::shortened(&known.join(", "), LONGEST_LIST);
-        let name = offtrack::files::reader::shortened(unknown, LONGEST_NAME);
+        let list = shortened(&known.join(", "), LONGEST_LIST);
+        let name = shortened(unknown, LONGEST_NAME);
         return Err(PyValueError::new_err(format!(
             "routes: {name:?}; {} has {list}, and random roads have names as wide/7/12",
             scenario.name
@@ -78,7 +98,7 @@ pub fn narrow(scenario: &mut Scenario, split: &str, names: Option<&[String]>) ->
     scenario.retain(|_, route| wanted.iter().any(|name| is_of(&route.name, name)));
     let mut splits = Split::ALL.into_iter().filter(|&split| !scenario.split(split).is_empty());
     let first = splits.next().filter(|_| added.is_empty() && splits.next().is_none());
-    Ok(first.map_or("routes", Split::name))
+    Ok((first.map_or("routes", Split::name), files))
 }
 
 fn known(scenario: &Scenario) -> Vec<String> {

@@ -13,8 +13,8 @@ pub struct Saturated {
     demand: Demand,
     /// Sources of the arm.
     pub sources: Vec<usize>,
-    /// Of each whether its cars meet those of the arm's other lanes on their way, as on an approach that is narrow: then
-    /// these limit it too, not the circulating flow alone.
+    /// Of each whether its cars meet those of the arm's other lanes on their way, as on an approach that is narrow:
+    /// then these limit it too, not the circulating flow alone.
     pub lanes_meet: Vec<bool>,
 }
 

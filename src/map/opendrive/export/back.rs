@@ -58,7 +58,8 @@ pub(super) fn check(reader: &Reader, road: &Road, text: &str) -> Result<(), Erro
     }
     let at = frame.to_map(at);
     let expected = format!(
-        "more is paved there than its routes' lanes and the gutters; {KEEP}, or import a drawing with a wider --lane-width"
+        "more is paved there than its routes' lanes and the gutters; {KEEP}, or import a drawing with a \
+         wider --lane-width"
     );
     Err(reader.invalid("kerbs", format!("{off:.2} m off at ({:.1}, {:.1}) as a map", at.x, at.y), expected))
 }
