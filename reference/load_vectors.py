@@ -59,7 +59,7 @@ class Roll:
 
 
 def motion(
-    truck: dict, v: float, curvature: float, acceleration: float, gamma: float
+    truck: dict, v: float, curvature: float, acceleration: float, gamma: float, slips: tuple[float, float]
 ) -> tuple[float, float, float, float]:
     """Yaw rates of both units, side speed of the drive axle, speed of the trailer's axle."""
     grip = truck["mu"] * G
@@ -67,16 +67,26 @@ def motion(
         grip *= math.sqrt(max(1 - (acceleration / grip) ** 2, 0))
     most = grip / max(v * v, 0.01)
     r1 = v * clamp(curvature, -most, most)
-    vy = -min(truck["K"] * v * v, truck["lever_max"]) * r1
+    vy = -min(slips[0] * v * v, truck["lever_max"]) * r1
     vh = vy + truck["a"] * r1
     v2 = v * math.cos(gamma) - vh * math.sin(gamma)
-    r2 = (v * math.sin(gamma) + vh * math.cos(gamma)) / (truck["L2"] - min(truck["K"] * v2 * v2, truck["lever_max"]))
+    r2 = (v * math.sin(gamma) + vh * math.cos(gamma)) / (truck["L2"] - min(slips[1] * v2 * v2, truck["lever_max"]))
     return r1, r2, vy, v2
+
+
+def steered_wheelbase(truck: dict, v: float) -> float:
+    return truck["L1"] + truck["understeer"] * v * v
+
+
+def leaning_on(truck: dict, own: float, trailers: float) -> float:
+    """The tractor's load transfer ratio where the trailer leans on it."""
+    return own + truck["fifth_wheel_load"] * (trailers - own)
 
 
 def drive(truck: dict, init: dict, commands: list[dict], times: list[float]) -> tuple[list[dict], dict]:
     x, y, p1, p2, v, delta = (init[k] for k in ("x", "y", "psi1", "psi2", "v", "delta"))
-    curvature, a, integral, asked, holds = math.tan(delta) / truck["L1"], 0.0, 0.0, 0.0, False
+    curvature, a, integral, asked, holds = math.tan(delta) / steered_wheelbase(truck, v), 0.0, 0.0, 0.0, False
+    slips = (truck["K"], truck["K"])
     tractor, trailer = Roll(truck, "1"), Roll(truck, "2")
     peak = dict.fromkeys(("ay1", "ay2", "ltr1_qs", "ltr2_qs", "ltr1_dyn", "ltr2_dyn", "gamma"), 0.0)
     states, wanted = [], list(times)
@@ -84,12 +94,14 @@ def drive(truck: dict, init: dict, commands: list[dict], times: list[float]) -> 
     delay = round(truck["delta_delay"] / STEP)
     starts = [round(command["t"] / STEP) for command in commands]
     for n in range(n_steps + 1):
-        r1, r2, vy, v2 = motion(truck, v, curvature, a, p1 - p2)
+        r1, r2, vy, v2 = motion(truck, v, curvature, a, p1 - p2, slips)
         ay1, ay2 = v * r1, v2 * r2
         fall = truck["crossfall"] * G
-        found = {"ay1": ay1, "ay2": ay2, "ltr1_qs": ay1 * tractor.static, "ltr2_qs": ay2 * trailer.static}
-        found["gamma"] = p1 - p2
-        found["ltr1_dyn"], found["ltr2_dyn"] = tractor.ratio(ay1 + fall), trailer.ratio(ay2 + fall)
+        found = {"ay1": ay1, "ay2": ay2, "ltr2_qs": ay2 * trailer.static, "gamma": p1 - p2}
+        found["ltr2_dyn"] = trailer.ratio(ay2 + fall)
+        found["ltr1_qs"] = leaning_on(truck, ay1 * tractor.static, found["ltr2_qs"])
+        found["ltr1_dyn"] = leaning_on(truck, tractor.ratio(ay1 + fall), found["ltr2_dyn"])
+        slips = tuple(truck["K"] * (1 + truck["slip_growth"] * abs(found[key])) for key in ("ltr1_dyn", "ltr2_dyn"))
         peak = {key: max(value, abs(found[key])) for key, value in peak.items()}
         if wanted and n == round(wanted[0] / STEP):
             hitch = [x + truck["a"] * math.cos(p1), y + truck["a"] * math.sin(p1)]
@@ -121,10 +133,11 @@ def drive(truck: dict, init: dict, commands: list[dict], times: list[float]) -> 
             after, mean, speed = 0.0, 0.0, 0.0
         within_lock, largest = clamp(target_delta, -truck["delta_max"], truck["delta_max"]), truck["delta_rate"] * STEP
         turned = delta + clamp(within_lock - delta, -largest, largest)
-        rolling = math.tan(turned) / truck["L1"]
+        rolling = math.tan(turned) / steered_wheelbase(truck, speed)
         tau = truck["yaw_lag"] * truck["K"] * abs(v)
         bent = rolling + (curvature - rolling) * math.exp(-STEP / tau) if tau > 1e-9 else rolling
-        middle = motion(truck, 0.5 * (v + speed), 0.5 * (curvature + bent), mean, p1 - p2 + 0.5 * STEP * (r1 - r2))
+        bend = p1 - p2 + 0.5 * STEP * (r1 - r2)
+        middle = motion(truck, 0.5 * (v + speed), 0.5 * (curvature + bent), mean, bend, slips)
         m1, m2, my, mv2 = middle
         half, mid = p1 + 0.5 * STEP * r1, 0.5 * (v + speed)
         x += STEP * (mid * math.cos(half) - my * math.sin(half))
@@ -139,6 +152,7 @@ def drive(truck: dict, init: dict, commands: list[dict], times: list[float]) -> 
 def courses() -> dict[str, tuple[float, list[tuple[float, float, float]], float, dict]]:
     """Speed at the start [km/h], commands (time, steer angle [deg], target speed [km/h]), end, what differs."""
     s_bend = [(0, 0, 20), (0.5, 6, 20), (4, -6, 20), (7.5, 0, 20)]
+    fast_bend = [(0, 0, 30), (0.5, 6, 30), (4, -6, 27), (7.5, 0, 27)]
     return {
         "slows_into_bend": (30, [(0, 0, 15), (4, 8, 15)], 12, {}),
         "leaves_bend": (15, [(0, 8, 15), (4, 2, 30)], 12, {}),
@@ -146,6 +160,7 @@ def courses() -> dict[str, tuple[float, list[tuple[float, float, float]], float,
         "stop_and_go": (20, [(0, 3, 0), (9, 6, 20)], 16, {}),
         "from_50": (50, [(0, 0, 20), (6, 7, 20)], 12, {"ellipse": True, "mu": 0.5, "delta_delay": 0.05}),
         "tilted": (25, [(0, 4, 25), (5, -4, 18)], 12, {"crossfall": 0.025}),
+        "real_tyres": (30, fast_bend, 12, {"slip_growth": 1.0, "understeer": 0.0021, "fifth_wheel_load": 0.26}),
     }
 
 
@@ -158,7 +173,8 @@ def cases() -> list[dict]:
             truck |= {"K": slip, "mu": 0.7, "delta_max": math.radians(40), "delta_rate": math.radians(20)}
             truck |= {"a_max": strongest, "a_min": -6.0, "lever_max": 4.0, "yaw_lag": 1.0, "drive_lag": 0.45}
             truck |= {"brake_lag": 0.35, "delta_delay": 0.0, "power": 330e3 / mass, "ellipse": False}
-            truck |= {"crossfall": 0.0, "kp": 0.8, "ki": 0.05, "band": 0.5 / 3.6, "brake": -2.5} | changes
+            truck |= {"crossfall": 0.0, "kp": 0.8, "ki": 0.05, "band": 0.5 / 3.6, "brake": -2.5}
+            truck |= {"slip_growth": 0.0, "understeer": 0.0, "fifth_wheel_load": 0.0} | changes
             init = {"x": 3.0, "y": -2.0, "psi1": 0.4, "psi2": 0.4, "v": speed / 3.6, "delta": 0.0}
             commands = [{"t": t, "delta_cmd": math.radians(steer), "v_cmd": target / 3.6} for t, steer, target in steps]
             times = [float(t) for t in range(0, end + 1, 2)]

@@ -240,7 +240,6 @@ impl Run<'_> {
         let (x, y) = (x + f64::from(truck.position.x), y + f64::from(truck.position.y));
         let hitch = [x + vehicle.a * self.psi1.cos(), y + vehicle.a * self.psi1.sin()];
         let (ay1, ay2) = (f64::from(motion.lateral_acceleration), f64::from(motion.trailer_lateral_acceleration));
-        let trailer_roll = Vec2::new(truck.trailer_roll, truck.trailer_roll_rate);
         State {
             t: self.t,
             x,
@@ -254,14 +253,12 @@ impl Run<'_> {
             trailer_axle: [hitch[0] - vehicle.L2 * self.psi2.cos(), hitch[1] - vehicle.L2 * self.psi2.sin()],
             ay1,
             ay2,
-            ltr1_qs: vehicle.tractor_suspension().quasi_static_load_transfer_ratio(ay1),
+            ltr1_qs: vehicle.leaning_on(
+                vehicle.tractor_suspension().quasi_static_load_transfer_ratio(ay1),
+                vehicle.trailer_suspension().quasi_static_load_transfer_ratio(ay2),
+            ),
             ltr2_qs: vehicle.trailer_suspension().quasi_static_load_transfer_ratio(ay2),
-            ltr2_dyn: load_transfer_ratio(
-                &vehicle.trailer_suspension().roll(self.case.dt),
-                trailer_roll,
-                motion.trailer_lateral_acceleration + self.fall(),
-            )
-            .into(),
+            ltr2_dyn: self.trailer_ratio(),
         }
     }
 
@@ -273,12 +270,16 @@ impl Run<'_> {
     fn tractor_ratio(&self) -> f64 {
         let Moving { truck, motion } = &self.moving;
         let roll = self.case.vehicle.tractor_suspension().roll(self.case.dt);
-        load_transfer_ratio(
-            &roll,
-            Vec2::new(truck.tractor_roll, truck.tractor_roll_rate),
-            motion.lateral_acceleration + self.fall(),
-        )
-        .into()
+        let leaning = Vec2::new(truck.tractor_roll, truck.tractor_roll_rate);
+        let own = load_transfer_ratio(&roll, leaning, motion.lateral_acceleration + self.fall());
+        self.case.vehicle.leaning_on(own.into(), self.trailer_ratio())
+    }
+
+    fn trailer_ratio(&self) -> f64 {
+        let Moving { truck, motion } = &self.moving;
+        let roll = self.case.vehicle.trailer_suspension().roll(self.case.dt);
+        let leaning = Vec2::new(truck.trailer_roll, truck.trailer_roll_rate);
+        load_transfer_ratio(&roll, leaning, motion.trailer_lateral_acceleration + self.fall()).into()
     }
 }
 

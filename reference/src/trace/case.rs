@@ -103,6 +103,15 @@ pub struct CaseVehicle {
     /// Bound of `K v²` (m).
     #[serde(default = "slip_lever")]
     pub lever_max: f64,
+    /// Increase of each unit's slip with its load transfer ratio: `K` times `1 + slip_growth |ratio|`.
+    #[serde(default)]
+    pub slip_growth: f64,
+    /// Increase of the steer angle that a path needs, per lateral acceleration [rad/(m/s^2)].
+    #[serde(default)]
+    pub understeer: f64,
+    /// Fraction by which the trailer's load transfer ratio counts in the tractor's.
+    #[serde(default)]
+    pub fifth_wheel_load: f64,
     /// Time constant of the tractor's yaw over `K v`.
     #[serde(default)]
     pub yaw_lag: f64,
@@ -231,6 +240,11 @@ impl CaseVehicle {
         }
     }
 
+    /// The tractor's load transfer ratio where it would have its `own` alone: the trailer leans on it.
+    pub fn leaning_on(&self, own: f64, trailers: f64) -> f64 {
+        own + self.fifth_wheel_load * (trailers - own)
+    }
+
     /// The rig for the drive stage with sub-steps of `substep` seconds, without outline and speed control.
     pub fn rig(&self, substep: f64) -> Rig {
         Rig {
@@ -238,6 +252,9 @@ impl CaseVehicle {
             fifth_wheel: self.a as f32,
             trailer_wheelbase: self.L2 as f32,
             slip: self.K as f32,
+            slip_growth: self.slip_growth as f32,
+            understeer: self.understeer as f32,
+            fifth_wheel_load: self.fifth_wheel_load as f32,
             steer_max: self.delta_max as f32,
             steer_rate: self.delta_rate as f32,
             acceleration_min: self.a_min as f32,
@@ -287,6 +304,9 @@ impl Case {
         self.within("vehicle.power", vehicle.power.unwrap_or(1.0), 0.01..=1e5, "W/kg")?;
         self.within("vehicle.crossfall", vehicle.crossfall, -0.5..=0.5, "")?;
         self.within("vehicle.K", vehicle.K, 0.0..=1.0, "rad/(m/s^2)")?;
+        self.within("vehicle.slip_growth", vehicle.slip_growth, 0.0..=5.0, "")?;
+        self.within("vehicle.understeer", vehicle.understeer, -0.01..=0.02, "rad/(m/s^2)")?;
+        self.within("vehicle.fifth_wheel_load", vehicle.fifth_wheel_load, 0.0..=1.0, "")?;
         self.within("vehicle.mu", vehicle.mu.unwrap_or(1.0), 0.0..=10.0, "")?;
         if vehicle.ellipse && vehicle.mu.is_none() {
             return Err(self.refused("vehicle.ellipse", "true", "needs vehicle.mu, the grip that it shares out"));

@@ -146,11 +146,15 @@ fn trajectory(engine: &Engine, written: &Value, changed: impl Fn(&mut Case)) -> 
     assert_eq!(case.dt, 0.05);
     changed(&mut case);
     let traced = traced(engine, &case);
-    assert!(
-        !matches!(engine, Engine::Cpu) || traced == trace(&case).unwrap(),
-        "{}: a trace differs from the drive stage",
-        case.id
-    );
+    if matches!(engine, Engine::Cpu) {
+        let chained = trace(&case).unwrap();
+        // A stage begins with the roll of its truck, the next sub-step of one with that of the sub-step before.
+        let is_alike = match case.vehicle.slip_growth == 0.0 {
+            true => traced == chained,
+            false => (compare(&traced, written).ratio - compare(&chained, written).ratio).abs() < 0.05,
+        };
+        assert!(is_alike, "{}: a trace differs from the drive stage", case.id);
+    }
     compare(&traced, written)
 }
 
@@ -271,7 +275,7 @@ fn every_reference_vector_holds_within_its_own_tolerance() {
 fn target_speeds_loads_and_lags_give_the_trajectories_of_an_independent_integrator() {
     for (name, engine) in engines() {
         let cases = cases_of("load_vectors.json");
-        assert_eq!(cases.len(), 24);
+        assert_eq!(cases.len(), 28);
         for case in cases {
             let worst = trajectory(&engine, &case, |_| {});
             println!("{} on the {name}: {:.4} ({})", case["id"], worst.ratio, worst.what);
@@ -279,7 +283,7 @@ fn target_speeds_loads_and_lags_give_the_trajectories_of_an_independent_integrat
         }
     }
     // Each of the model's parts is needed by a case.
-    let changes: [fn(&mut CaseVehicle); 7] = [
+    let changes: [fn(&mut CaseVehicle); 10] = [
         |vehicle| vehicle.yaw_lag = 0.0,
         |vehicle| vehicle.drive_lag = 0.0,
         |vehicle| vehicle.brake_lag = 0.0,
@@ -287,6 +291,9 @@ fn target_speeds_loads_and_lags_give_the_trajectories_of_an_independent_integrat
         |vehicle| vehicle.crossfall = 0.0,
         |vehicle| vehicle.kp = 0.75,
         |vehicle| vehicle.K *= 1.05,
+        |vehicle| vehicle.slip_growth = 0.0,
+        |vehicle| vehicle.understeer = 0.0,
+        |vehicle| vehicle.fifth_wheel_load = 0.0,
     ];
     for (index, change) in changes.into_iter().enumerate() {
         let fails = |case: &Value| 1.0 < trajectory(&Engine::Cpu, case, |case| change(&mut case.vehicle)).ratio;
