@@ -45,7 +45,8 @@ pub struct Args {
     /// lie.
     #[arg(long)]
     plot: Option<PathBuf>,
-    /// Write each road as an OpenDRIVE map, too: wide-7-12.xodr.
+    /// Write each road as an OpenDRIVE map, too, wide-7-12.xodr, but for the few that lose routes or kerbs so, which are
+    /// named.
     #[arg(long, requires = "output")]
     xodr: bool,
     /// Write over files of these names that the folder has already and that hold something else.
@@ -90,10 +91,14 @@ pub fn run(args: &Args) -> Result<(), Error> {
         Some(folder) => sheets(folder, &distribution, args, &roads)?,
         None => Vec::new(),
     };
-    let maps = match args.xodr {
-        true => roads.iter().map(|road| map(&distribution, args.seed, road)).collect::<Result<_, Error>>()?,
-        false => Vec::new(),
-    };
+    // About one road in thirty cannot be a map.
+    let (mut maps, mut refused) = (Vec::new(), Vec::new());
+    for road in roads.iter().filter(|_| args.xodr) {
+        match map(&distribution, args.seed, road) {
+            Ok(map) => maps.push(map),
+            Err(error) => refused.push(format!("no map of it is written: {error}")),
+        }
+    }
     let plot = args.plot.as_ref().map(|file| picture(file, &histograms(&distribution, args, &roads)?)).transpose()?;
     if let Some(folder) = &args.output {
         let file = |road: &RandomRoad| {
@@ -112,6 +117,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
         files::make_folder(folder)?;
         files().try_for_each(|(file, bytes)| files::write_whole(&file, &bytes))?;
     }
+    refused.iter().for_each(|refused| files::say(refused));
     if let (Some(file), Some(bytes)) = (&args.plot, &plot) {
         files::write_whole(file, bytes)?;
     }

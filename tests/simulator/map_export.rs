@@ -144,6 +144,37 @@ fn a_road_whose_arms_end_at_its_ring_is_refused_with_the_length_that_would_do() 
 }
 
 #[test]
+fn what_is_paved_between_lanes_is_in_the_map_however_long_the_arms_are() {
+    for (name, lengths) in [("50m", [85.0, 130.0]), ("32m", [115.0, 300.0]), ("40m-maps", [110.0, 130.0])] {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenarios/roundabouts/{name}.toml"));
+        let keys = std::fs::read_to_string(file).unwrap();
+        for length in lengths {
+            let line = |line: &str| match line.starts_with("length = ") {
+                true => format!("length = {length:?}\n"),
+                false => format!("{line}\n"),
+            };
+            let folder = tempfile::tempdir().unwrap();
+            let file = folder.path().join("long.toml");
+            std::fs::write(&file, keys.lines().map(line).collect::<String>()).unwrap();
+            let text = exported(&Road::read(&file).unwrap()).unwrap_or_else(|error| panic!("{name}: {error}"));
+            // No width falls to nothing between two that are wide, as where a line meets itself.
+            let widths = |road: &str| -> Vec<f64> {
+                let width = |rest: &str| rest.split_once(" a=\"")?.1.split('"').next()?.parse().ok();
+                road.split("<width ").skip(1).filter_map(width).collect()
+            };
+            for road in text.split("<road ").filter(|road| road.contains(" middle\"")) {
+                let widths = widths(road);
+                assert!(
+                    2 < widths.len()
+                        && !widths.windows(3).any(|three| 0.05 < three[0] && three[1] < 1e-6 && 0.05 < three[2]),
+                    "{name}: {widths:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
 fn an_import_that_paves_more_than_its_routes_is_refused_by_the_kerbs_that_would_be_lost() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/maps/zala8.outline.toml");
     let said = exported(&Road::read(&file).unwrap()).unwrap_err().to_string();

@@ -58,8 +58,8 @@ pub(super) fn check(reader: &Reader, road: &Road, text: &str) -> Result<(), Erro
     }
     let at = frame.to_map(at);
     let expected = format!(
-        "more is paved there than its routes' lanes and the gutters; {KEEP}, or import a drawing with a \
-         wider --lane-width"
+        "the map's lanes, middles and gutters do not cover what is paved there, or cover more; {KEEP}, or import a \
+         drawing with a wider --lane-width"
     );
     Err(reader.invalid("kerbs", format!("{off:.2} m off at ({:.1}, {:.1}) as a map", at.x, at.y), expected))
 }
