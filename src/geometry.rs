@@ -250,6 +250,14 @@ impl Curve {
         points
     }
 
+    /// The points of a closed curve as a polygon, each once. Where the curve crosses itself in a loop of less than a few
+    /// millimetres, as one that was fitted to a map may, the polygon does not.
+    pub fn polygon(&self, tolerance: f64) -> Vec<DVec2> {
+        let mut points = self.polyline(tolerance);
+        points.pop();
+        area::uncrossed(points)
+    }
+
     /// This curve in the opposite direction.
     pub fn reversed(&self) -> Curve {
         Curve { pieces: self.pieces.iter().rev().map(Piece::reversed).collect() }

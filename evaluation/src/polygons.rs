@@ -24,11 +24,7 @@ pub fn corners(kerbs: &Outline) -> (Vec<Vec<DVec2>>, Vec<Vec<DVec2>>) {
     // Loops keep the drivable side on their left: the boundary turns counter-clockwise, islands clockwise.
     let (mut boundary, islands): (Vec<_>, Vec<_>) = kerbs.loops.iter().partition(|curve| 0.0 < curve.signed_area());
     boundary.sort_by(|a, b| b.signed_area().total_cmp(&a.signed_area()));
-    let closed = |curve: &Curve| {
-        let mut points = curve.polyline(TOLERANCE);
-        points.pop();
-        points
-    };
+    let closed = |curve: &Curve| curve.polygon(TOLERANCE);
     (boundary.into_iter().map(closed).collect(), islands.into_iter().map(closed).collect())
 }
 

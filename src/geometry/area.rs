@@ -19,6 +19,9 @@ use crate::geometry::Piece;
 /// coincide cross each other without end (1/m).
 const GRID: f64 = 16384.0;
 
+/// Loops and spikes smaller than this are none (m, m²).
+const LOOP: f64 = 1e-3;
+
 /// Contours of one connected part: its outer one, then its holes.
 type Part = Vec<Vec<[f64; 2]>>;
 
@@ -63,6 +66,50 @@ pub(crate) fn counter_clockwise(mut contour: Vec<DVec2>) -> Vec<DVec2> {
 pub(crate) fn signed_area(contour: &[[f64; 2]]) -> f64 {
     let n = contour.len();
     (0..n).map(|i| DVec2::from(contour[i]).perp_dot(contour[(i + 1) % n].into())).sum::<f64>() / 2.0
+}
+
+/// The contour of a curve that crosses itself in loops too small to see, without them; any other one as it is.
+pub(crate) fn uncrossed(contour: Vec<DVec2>) -> Vec<DVec2> {
+    if !crosses_itself(&contour) {
+        return contour;
+    }
+    let turned = |contour: &[[f64; 2]]| 0.0 < signed_area(contour);
+    let before: Vec<[f64; 2]> = contour.iter().map(|&p| p.into()).collect();
+    let tidy = Area::union(std::iter::once(counter_clockwise(contour))).tidied(LOOP, LOOP);
+    let outer = tidy.parts.iter().filter_map(|part| part.first());
+    let largest = outer.max_by(|one, other| signed_area(one).abs().total_cmp(&signed_area(other).abs()));
+    let mut kept = largest.map_or_else(|| points(&before), |largest| points(largest));
+    if largest.is_some_and(|largest| turned(largest) != turned(&before)) {
+        kept.reverse();
+    }
+    kept
+}
+
+/// Whether two edges of a closed contour cross that are no neighbours, or all but touch.
+fn crosses_itself(contour: &[DVec2]) -> bool {
+    let n = contour.len();
+    let edge = |i: usize| [contour[i], contour[(i + 1) % n]];
+    let bounds = |[a, b]: [DVec2; 2]| (a.min(b) - LOOP, a.max(b) + LOOP);
+    let near = |one: [DVec2; 2], other: [DVec2; 2]| {
+        let ((low, high), (other_low, other_high)) = (bounds(one), bounds(other));
+        low.cmple(other_high).all() && other_low.cmple(high).all()
+    };
+    let side = |[a, b]: [DVec2; 2], p: DVec2| (b - a).perp_dot(p - a);
+    let crosses = |one: [DVec2; 2], other: [DVec2; 2]| {
+        side(one, other[0]) * side(one, other[1]) <= 0.0 && side(other, one[0]) * side(other, one[1]) <= 0.0
+    };
+    // From west to east, an edge is compared with those that begin before it ends.
+    let mut order: Vec<usize> = (0..n).collect();
+    let west = |&i: &usize| edge(i)[0].x.min(edge(i)[1].x);
+    order.sort_by(|one, other| west(one).total_cmp(&west(other)));
+    (0..n).any(|at| {
+        let one = order[at];
+        let east = bounds(edge(one)).1.x;
+        order[at + 1..].iter().take_while(|other| west(other) <= east).any(|&other| {
+            let are_neighbours = (one + 1) % n == other || (other + 1) % n == one;
+            !are_neighbours && near(edge(one), edge(other)) && crosses(edge(one), edge(other))
+        })
+    })
 }
 
 impl Area {

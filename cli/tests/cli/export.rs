@@ -73,4 +73,56 @@ fn generated_roads_are_written_as_maps_of_the_same_roads_too() {
         place.json("a.json")
     };
     assert_eq!(json["routes"].as_array().unwrap().len(), 20);
+    // One of these three loses routes as a map; the others and all roads are written.
+    let folder = place.text("some");
+    let output = offtrack(&["generate", "--seed", "2026", "--count", "3", "--xodr", "-o", &folder]);
+    succeed(&output);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(said.contains("no map of it is written: wide/2026/1: routes: 20; as a map it has 17"), "{said}");
+    for (file, is_there) in [("0.xodr", true), ("1.xodr", false), ("1.toml", true), ("2.xodr", true)] {
+        assert_eq!(place.file(&format!("some/wide-2026-{file}")).exists(), is_there, "{file}");
+    }
+}
+
+#[test]
+fn features_are_valid_polygons_and_lines_without_a_turn_back() {
+    let place = Place::new();
+    let maps = crate::place::repository().join("scenarios/maps");
+    for name in ["zala8", "zala25", "town03", "town03-crossing"] {
+        let file = place.text("road.geojson");
+        succeed(&offtrack(&["export", maps.join(format!("{name}.outline.toml")).to_str().unwrap(), "-o", &file]));
+        for feature in place.json("road.geojson")["features"].as_array().unwrap() {
+            let points = |value: &Value| -> Vec<[f64; 2]> {
+                value.as_array().unwrap().iter().map(|p| [0, 1].map(|axis| p[axis].as_f64().unwrap())).collect()
+            };
+            let coordinates = &feature["geometry"]["coordinates"];
+            match feature["geometry"]["type"].as_str().unwrap() {
+                "Polygon" => {
+                    let crossings = crossings(&points(&coordinates[0]));
+                    assert!(crossings.is_empty(), "{name}, {}: {crossings:?}", feature["properties"]);
+                }
+                "LineString" => {
+                    let line = points(coordinates);
+                    let turns_back = line.windows(3).find(|three| {
+                        let [one, other] = [0, 1].map(|i| [0, 1].map(|axis| three[i + 1][axis] - three[i][axis]));
+                        one[0] * other[0] + one[1] * other[1] < 0.0
+                    });
+                    assert_eq!(turns_back, None, "{name}");
+                }
+                _ => {}
+            }
+        }
+    }
+}
+
+/// Pairs of edges of a closed ring that cross, those of neighbours left out.
+fn crossings(ring: &[[f64; 2]]) -> Vec<[usize; 2]> {
+    let n = ring.len() - 1;
+    let side = |a: [f64; 2], b: [f64; 2], p: [f64; 2]| (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
+    let cross = |i: usize, j: usize| {
+        let (a, b, c, d) = (ring[i], ring[i + 1], ring[j], ring[j + 1]);
+        side(a, b, c) * side(a, b, d) < 0.0 && side(c, d, a) * side(c, d, b) < 0.0
+    };
+    let pairs = (0..n).flat_map(|i| (i + 2..n).map(move |j| [i, j]));
+    pairs.filter(|&[i, j]| (i, j) != (0, n - 1) && cross(i, j)).collect()
 }

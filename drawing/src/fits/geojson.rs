@@ -18,6 +18,8 @@ use super::stations;
 const CHORD: f64 = 5e-4;
 /// Parts of a metre that coordinates are rounded to.
 const ROUNDED: f64 = 1e4;
+/// Points of a line nearer than this to the one before are left out (m).
+const SAME: f64 = 2e-3;
 
 /// The road as it lies in the world, its kerbs, the lines of its routes and its centre, with the swept paths of one
 /// vehicle. `crs` names the frame of its map.
@@ -39,10 +41,14 @@ pub fn geojson(road: &Road, gutter: Gutter, shown: &[&Shown], crs: Option<&str>)
             Kerb::Island => "island".to_owned(),
             Kerb::Splitter(arm) => format!("splitter {}", ground.arms[arm].name),
         };
-        features.push(feature(json!({"part": "kerb", "of": of}), "Polygon", json!([frame.ring(&ring(curve))])));
+        features.push(feature(
+            json!({"part": "kerb", "of": of}),
+            "Polygon",
+            json!([frame.ring(&curve.polygon(CHORD))]),
+        ));
     }
     for apron in road.aprons() {
-        let rings: Vec<Vec<DVec2>> = apron.loops.iter().map(ring).collect();
+        let rings: Vec<Vec<DVec2>> = apron.loops.iter().map(|curve| curve.polygon(CHORD)).collect();
         features.push(feature(json!({"part": "apron"}), "MultiPolygon", frame.areas(&rings)));
     }
     for line in &ground.lines {
@@ -67,13 +73,6 @@ pub fn geojson(road: &Road, gutter: Gutter, shown: &[&Shown], crs: Option<&str>)
     text = text.replace("{\"geometry\"", "\n{\"geometry\"");
     text.push('\n');
     Ok(text)
-}
-
-/// The points of a closed curve, each once.
-fn ring(curve: &Curve) -> Vec<DVec2> {
-    let mut points = curve.polyline(CHORD);
-    points.pop();
-    points
 }
 
 /// The features of a swept path.
@@ -129,7 +128,14 @@ impl Frame {
     }
 
     fn curve(&self, curve: &Curve) -> Value {
-        self.positions(&curve.polyline(CHORD))
+        let mut points = curve.polyline(CHORD);
+        // Two points that are rounded to neighbours have no direction.
+        let end = points.last().copied();
+        points.dedup_by(|after, before| after.distance(*before) < SAME);
+        if let (Some(last), Some(end)) = (points.last_mut(), end) {
+            *last = end;
+        }
+        self.positions(&points)
     }
 
     /// A ring ends where it begins.

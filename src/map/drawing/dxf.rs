@@ -47,6 +47,11 @@ impl Unit {
         ("in", Unit::Inch),
     ];
 
+    /// Its word of a flag.
+    fn name(self) -> &'static str {
+        Unit::NAMED.iter().find(|(_, unit)| *unit == self).map_or("", |(name, _)| name)
+    }
+
     /// Those of these units, as an error lists them.
     pub(super) fn listed(named: &[(&str, Unit)]) -> String {
         let names: Vec<&str> = named.iter().map(|(name, _)| *name).collect();
@@ -82,13 +87,13 @@ impl Unit {
 impl Drawing {
     pub(super) fn parse(file: &Path, text: &str, layers: &Layers) -> Result<Drawing, Error> {
         let pairs = pairs(file, text)?;
-        let unit = unit(file, &pairs, layers)?;
+        let (unit, note) = unit(file, &pairs, layers)?;
         check_whole(file, &pairs)?;
         let entities = section(&pairs, "ENTITIES");
         let blocks = drawn_blocks(&pairs, layers);
         let reader = Reader::of(file);
         reader.count("entities", entities.len(), 0..=MOST_ENTITIES)?;
-        let mut drawing = Drawing::default();
+        let mut drawing = Drawing { notes: note.into_iter().collect(), ..Drawing::default() };
         let mut others: BTreeMap<&str, usize> = BTreeMap::new();
         let mut without_outline: Vec<&str> = Vec::new();
         let mut on_paper = 0;
@@ -175,16 +180,29 @@ fn reach(reader: &Reader, kerbs: &[Entity]) -> Result<(), Error> {
     Err(reader.invalid("kerbs", format!("reach over {over:.2} m"), expected))
 }
 
-/// The unit that is asked for, else that of the header.
-fn unit(file: &Path, pairs: &[Pair], layers: &Layers) -> Result<Unit, Error> {
-    if let Some(unit) = layers.unit {
-        return Ok(unit);
-    }
+/// The unit that is asked for, else that of the header; and a note where the header says another one.
+fn unit(file: &Path, pairs: &[Pair], layers: &Layers) -> Result<(Unit, Option<String>), Error> {
     let stated = pairs.windows(2).find(|pair| pair[0].code == 9 && pair[0].value == "$INSUNITS").map(|pair| pair[1]);
-    stated.and_then(|pair| Unit::of_code(pair.value)).ok_or_else(|| {
+    let of_header = stated.and_then(|pair| Unit::of_code(pair.value));
+    let units = Unit::listed(&Unit::NAMED);
+    let says_none = stated.is_none_or(|pair| pair.value == "0");
+    if let Some(unit) = layers.unit {
+        let differs = !says_none && of_header != Some(unit);
+        let code = stated.map_or("", |pair| pair.value);
+        let name = of_header.map_or_else(|| "another unit".to_owned(), |unit| unit.name().to_owned());
+        return Ok((
+            unit,
+            differs.then(|| format!("$INSUNITS is {code}, {name}; lengths are taken as {}", unit.name())),
+        ));
+    }
+    of_header.map(|unit| (unit, None)).ok_or_else(|| {
         let (key, value) = stated.map_or(("$INSUNITS".to_owned(), "missing"), |pair| (pair.key(), pair.value));
-        let units = Unit::listed(&Unit::NAMED);
-        Reader::of(file).invalid(key, value, format!("the drawing does not say its unit: give --unit {units}"))
+        let expected = if says_none {
+            format!("the drawing does not say its unit: give --unit {units}")
+        } else {
+            format!("$INSUNITS is a unit that is not read: scale the drawing to {units}")
+        };
+        Reader::of(file).invalid(key, value, expected)
     })
 }
 

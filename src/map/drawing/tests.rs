@@ -108,6 +108,16 @@ fn feet_are_metres_and_a_drawing_that_does_not_say_its_unit_is_refused_with_the_
     let unknown = HEADER.replace("70\n6\n", "70\n0\n") + &drawn(&road, 1.0) + END;
     let said = parse(Path::new("site.dxf"), &unknown, &layers()).unwrap_err().to_string();
     assert!(said.contains("line 8") && said.contains("--unit m, mm, cm, ft, us-ft or in"), "{said}");
+    // A unit that is not read, and one that the flag contradicts.
+    let text = |code: &str| HEADER.replace("70\n6\n", &format!("70\n{code}\n")) + &drawn(&road, 1.0) + END;
+    let said = parse(Path::new("site.dxf"), &text("14"), &layers()).unwrap_err().to_string();
+    assert!(said.contains("14; $INSUNITS is a unit that is not read: scale the drawing to m, mm"), "{said}");
+    let metres = Layers { unit: Some(Unit::Metre), ..layers() };
+    for (code, expected) in [("6", None), ("0", None), ("14", Some("14, another unit;")), ("4", Some("4, mm;"))] {
+        let notes = parse(Path::new("site.dxf"), &text(code), &metres).unwrap().notes;
+        let noted = notes.iter().find_map(|note| note.strip_prefix("$INSUNITS is "));
+        assert_eq!(noted, expected.map(|said| format!("{said} lengths are taken as m")).as_deref(), "{notes:?}");
+    }
     // Metres that are said to be millimetres, and the other way round.
     for (code, drawn) in [("4", drawn(&road, 1.0)), ("6", drawn(&road, 0.001))] {
         let text = HEADER.replace("70\n6\n", &format!("70\n{code}\n")) + &drawn + END;
