@@ -43,9 +43,10 @@ pub struct Args {
     /// A film runs at twice the speed and shows the distance sensors. JSON: {"benchmark", "route", "policy", "seed",
     /// "episode", "episodes", "step" (s), "ended", "class": {"vehicle", "load"}: their names, where the benchmark has
     /// several, "vehicle": dimensions and sensors of the truck that drove, "actions": [[steer angle, speed], ...],
-    /// "map": {"drivable", "lanes"}, "centre_line", "frames": [...]}. Frame 0 is the start, frame n the state after
-    /// step n, the step that ended the episode included. Metres, seconds and radians, x east, y north, the ring's
-    /// centre at the origin.
+    /// "map": {"drivable", "lanes"}, "centre_line", "frames": [...], "vehicles": [[...], ...]: in each frame the others
+    /// by slot, of which a trailer's is 40 more than its tractor's}. Frame 0 is the start, frame n the state after step
+    /// n, the step that ended the episode included. Metres, seconds and radians, x east, y north, the ring's centre at
+    /// the origin.
     #[arg(short, long, verbatim_doc_comment)]
     output: PathBuf,
     /// A benchmark's name, or the path of its file.

@@ -51,7 +51,8 @@ pub fn road(name: &str, place: &PlaceArgs) -> Result<Road, Error> {
 
 /// The benchmark's world, with the fields of its roundabouts from the user's cache.
 pub fn world(scenario: &Scenario) -> Result<Arc<World>, Error> {
-    Ok(loading("baking", |loading| World::bake_with(scenario, loading))?.into())
+    let baked = loading("baking", |loading| World::bake_with(scenario, loading));
+    Ok(baked.map_err(|error| Error::contents(Path::new(&scenario.name), error.to_string()))?.into())
 }
 
 /// Does `work` on roads with the user's cache and, where there are many, a bar.

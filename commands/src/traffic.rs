@@ -14,6 +14,7 @@ use offtrack::files::reader::shown;
 use offtrack::map::Road;
 use offtrack::map::chosen::is_map;
 use offtrack::map::route::Lane;
+use offtrack::traffic::survey::Counts;
 use offtrack::traffic::{Mix, Network, Rules, Survey, together};
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
@@ -157,6 +158,34 @@ fn mix(shares: &[String]) -> Result<Mix, Error> {
         return Err(setting("--share", &shares.join(" "), "vans, buses and trucks must be at most 1 together"));
     }
     Ok(mix)
+}
+
+/// Large vehicles as fractions of all: those asked for, and those that came. Where one needs an oncoming lane a car
+/// comes instead.
+#[derive(Clone, Copy, serde::Serialize)]
+struct LargeShare {
+    asked: f64,
+    came: f64,
+    /// How many vehicles came.
+    #[serde(skip)]
+    of: u64,
+}
+
+impl LargeShare {
+    fn of(mix: Mix, counts: &Counts) -> LargeShare {
+        LargeShare { asked: mix.heavy(), came: counts.heavy(), of: counts.entered }
+    }
+
+    /// What a reader must know: far fewer came than were asked for.
+    fn note(&self) -> Option<String> {
+        let missing = (self.asked - self.came) * self.of as f64;
+        // More than chance: three deviations of the count.
+        let chance = 3.0 * (self.asked * self.of as f64).sqrt();
+        (chance < missing).then(|| {
+            let [asked, came] = [self.asked, self.came].map(|part| rounded(100.0 * part, 1));
+            format!("{came} % were large, not {asked}: where one needs an oncoming lane a car comes instead.\n")
+        })
+    }
 }
 
 /// A number in a column, rounded.

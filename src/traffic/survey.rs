@@ -44,6 +44,10 @@ pub struct Counts {
     pub came: u64,
     /// Those of them that found 15 waiting outside, and stayed away.
     pub stayed: u64,
+    /// Cars that came onto the road.
+    pub entered: u64,
+    /// Large vehicles among them.
+    pub large: u64,
     /// Cars that passed the line.
     pub served: u64,
     /// Those of them that stood in a blocked ring for two minutes, and were taken away.
@@ -69,6 +73,8 @@ impl Counts {
     pub fn add(&mut self, other: &Counts) {
         self.came += other.came;
         self.stayed += other.stayed;
+        self.entered += other.entered;
+        self.large += other.large;
         self.served += other.served;
         self.removed += other.removed;
         self.crowded += other.crowded;
@@ -94,6 +100,12 @@ impl Counts {
         let n = self.delayed + self.unfinished;
         let of_all = (0 < n).then(|| (self.delay + self.delay_so_far) / n as f64);
         of_all.map(|of_all| of_all.max(self.mean_delay().unwrap_or(0.0)))
+    }
+
+    /// Fraction of large vehicles among those that came onto the road: less than asked for where cars came in their
+    /// place.
+    pub fn heavy(&self) -> f64 {
+        self.large as f64 / self.entered.max(1) as f64
     }
 
     /// Whether more came than the lane could serve.
@@ -255,6 +267,8 @@ impl<'a> Observer<'a> {
                 Event::Entered(source, slot) => {
                     changed[slot] = true;
                     let car = run.cars[slot];
+                    self.counts[source].entered += u64::from(counts);
+                    self.counts[source].large += u64::from(counts && car.is_large());
                     let limit = self.survey.network.limit(car.path(), car.station);
                     let unhindered = Car { speed: limit << FINER_SPEED, ..car };
                     let free = *self.free.entry(car.what).or_insert_with(|| self.survey.free_time(unhindered));

@@ -1,6 +1,6 @@
 //! Other vehicles as all trucks share them: each road's paths, how many come, and the states that episodes begin in.
 
-use std::sync::atomic::AtomicU64;
+use std::sync::Mutex;
 
 use bytemuck::cast_slice;
 use rayon::prelude::*;
@@ -91,7 +91,7 @@ impl Traffic {
         let rules = Rules { courtesy: probability(of.courtesy), ..of.drivers.rules() };
         // Whether a driver is rude is drawn when an episode begins, and when a car comes.
         let mix = Mix { vans: of.vans as f32, rude: 0.0, large: of.large.map(|fraction| fraction as f32) };
-        let done = AtomicU64::new(0);
+        let done = Mutex::new(0);
         let road = |place: &Place| {
             loading.check()?;
             let road = TrafficRoad::baked(place, of, mix, &rules, loading)?;
@@ -143,13 +143,13 @@ impl TrafficRoad {
         rules: &Rules,
         loading: &Loading,
     ) -> Result<TrafficRoad, Error> {
+        let road = &place.roundabout.name;
         let invalid = |error: traffic::Error| {
-            let expected = "leave [traffic] out, or the road, or demand less".to_owned();
-            Error::Invalid(Invalid {
-                key: format!("traffic.demand on {}", place.roundabout.name),
-                value: error.to_string(),
-                expected,
-            })
+            let (key, would_do) = match error {
+                traffic::Error::TooLarge { .. } => ("traffic".to_owned(), "leave [traffic] out, or the road"),
+                _ => (format!("traffic.demand on {road}"), "demand less, or leave the road out"),
+            };
+            Error::Invalid(Invalid { key, value: error.to_string(), expected: would_do.to_owned() })
         };
         let network = Network::cached(&place.roundabout, mix.has_large(), loading.cache);
         let network = network.map_err(invalid)?.driven_by(of.drivers);

@@ -15,7 +15,7 @@ use offtrack_evaluation::files;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{Args, Place, STEPS_A_MINUTE, bar, rounded, setting, table, write_json};
+use super::{Args, LargeShare, Place, STEPS_A_MINUTE, bar, rounded, setting, table, write_json};
 
 /// Circulating flows (veh/h).
 const FLOWS: [f64; 5] = [0.0, 300.0, 600.0, 900.0, 1200.0];
@@ -36,6 +36,9 @@ struct Point {
     circulating: f64,
     capacity: f64,
     hcm: f64,
+    /// Of the vehicles of its arm, where large ones were asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    large: Option<LargeShare>,
     /// Its cars meet those of the arm's other lane on their way, which the manual does not know: it counts for no mean.
     lanes_meet: bool,
 }
@@ -90,7 +93,7 @@ pub(super) fn run(args: &Args, places: &[Place], mix: Mix) -> Result<(), Error> 
     drop(bar);
     files::print(&text(&points))?;
     if let Some(plot) = &args.plot {
-        let drawn = chart(args, mix, &points).drawn().and_then(|svg| {
+        let drawn = chart(args, &points).drawn().and_then(|svg| {
             let is_png = plot.extension().is_some_and(|extension| extension == "png");
             if is_png { rasterised(&svg, WIDTH) } else { Ok(svg.into_bytes()) }
         });
@@ -103,6 +106,9 @@ pub(super) fn run(args: &Args, places: &[Place], mix: Mix) -> Result<(), Error> 
 impl Case<'_> {
     /// The capacity of each lane of the arm.
     fn points(&self, runs: &[Vec<Counts>], hours: f64, mix: Mix) -> Vec<(Lane, Point)> {
+        let mut all = Counts::default();
+        runs.iter().flatten().for_each(|counts| all.add(counts));
+        let large = LargeShare::of(mix, &all);
         let of = |(index, &source): (usize, &usize)| {
             let (arm, lane) = self.place.source_name(source);
             let kind = self.survey.lane(source);
@@ -117,7 +123,8 @@ impl Case<'_> {
                 lanes: kind.name(self.place.road.is_mirrored()),
                 circulating,
                 capacity,
-                hcm: kind.capacity(circulating, mix.heavy()),
+                hcm: kind.capacity(circulating, large.came),
+                large: (0.0 < large.asked).then_some(large),
                 lanes_meet: self.saturated.lanes_meet[index],
             };
             (kind, point)
@@ -191,15 +198,20 @@ fn text(points: &[(Lane, Point)]) -> String {
     } else {
         ""
     };
-    format!("{}{note}\nmeans over all lanes of a kind\n{}", table(&rows), table(&sums))
+    let fewer: BTreeMap<&str, String> =
+        points.iter().filter_map(|(_, point)| Some((point.road.as_str(), point.large?.note()?))).collect();
+    let fewer: String = fewer.into_iter().map(|(road, note)| format!("{road}: {note}")).collect();
+    format!("{}{note}{fewer}\nmeans over all lanes of a kind\n{}", table(&rows), table(&sums))
 }
 
 /// The means with the least and greatest of each, and the manual's curves.
-fn chart(args: &Args, mix: Mix, points: &[(Lane, Point)]) -> Chart {
+fn chart(args: &Args, points: &[(Lane, Point)]) -> Chart {
     let mut lines = Vec::new();
+    let heavy = points.iter().filter_map(|(_, point)| point.large).map(|large| large.came).sum::<f64>()
+        / points.len().max(1) as f64;
     for ((kind, (name, means)), colour) in means(points).into_iter().zip(LINES) {
         let curve =
-            (0..=26).map(|step| f64::from(step) * 50.0).map(|flow| DVec2::new(flow, kind.capacity(flow, mix.heavy())));
+            (0..=26).map(|step| f64::from(step) * 50.0).map(|flow| DVec2::new(flow, kind.capacity(flow, heavy)));
         lines.push(Line { name: None, colour, kind: Kind::Reference, points: curve.collect() });
         let spread = means.iter().map(|mean| (mean.least, mean.most)).collect();
         let points = means.iter().map(|mean| DVec2::new(mean.circulating, mean.capacity)).collect();

@@ -1,7 +1,7 @@
 //! Delay, queue and level of service of each entry lane at a demand.
 
 use offtrack::layout::Stream;
-use offtrack::traffic::hcm::{control_delay, level_of_lane, level_of_service, queue_95};
+use offtrack::traffic::hcm::{control_delay, level_of_lane, queue_95};
 use offtrack::traffic::survey::Counts;
 use offtrack::traffic::{Mix, Rules};
 use offtrack_evaluation::error::Error;
@@ -9,7 +9,7 @@ use offtrack_evaluation::files;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{Args, Place, STEPS_A_MINUTE, bar, rounded, setting, table, write_json};
+use super::{Args, LargeShare, Place, STEPS_A_MINUTE, bar, rounded, setting, table, write_json};
 use crate::progress::Bar;
 
 /// Period of the manual's delays and queues (h).
@@ -22,7 +22,8 @@ struct Found {
     runs: u32,
     minutes: u32,
     entries: Vec<Entry>,
-    /// Mean control delay of all (s), and its level; none where no car got through.
+    /// Mean control delay of all (s), and its level, F where more came than could be served; none where no car got
+    /// through.
     delay: Option<f64>,
     level: Option<char>,
     /// Cars an hour, asked for and through.
@@ -34,6 +35,9 @@ struct Found {
     removed: u64,
     /// Part of the time in which cars waited outside since as many as can be were on the road.
     crowded: f64,
+    /// Where large vehicles were asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    large: Option<LargeShare>,
 }
 
 /// What was found of an entry lane; flows in cars an hour, delays in seconds, queues in cars.
@@ -90,13 +94,15 @@ fn found(args: &Args, place: &Place, mix: Mix, bar: &Bar) -> Result<Found, Error
         sums.iter_mut().zip(&counts).for_each(|(sum, counts)| sum.add(counts));
     }
     let hours = f64::from(args.runs) * f64::from(args.minutes) / 60.0;
+    let mut all = Counts::default();
+    sums.iter().for_each(|counts| all.add(counts));
     let entry = |(source, counts): (usize, &Counts)| {
         let (arm, lane) = place.source_name(source);
         let demand: f64 = flows[place.network.paths_of(source)].iter().sum();
         let [served, circulating] = [counts.served, counts.circulating].map(|count| count as f64 / hours);
         let hcm = place.network.has_ring.then(|| {
             let kind = survey.lane(source);
-            let capacity = kind.capacity(circulating, mix.heavy());
+            let capacity = kind.capacity(circulating, all.heavy());
             let delay = control_delay(demand, capacity, PERIOD);
             let queue_95 = queue_95(demand, capacity, PERIOD);
             let level = level_of_lane(delay, capacity < demand);
@@ -109,19 +115,18 @@ fn found(args: &Args, place: &Place, mix: Mix, bar: &Bar) -> Result<Found, Error
     };
     let most_crowded = sums.iter().map(|counts| counts.crowded).max().unwrap_or(0);
     let steps = f64::from(args.runs) * f64::from(args.minutes * STEPS_A_MINUTE);
-    let mut all = Counts::default();
-    sums.iter().for_each(|counts| all.add(counts));
     Ok(Found {
         road: place.road.name.clone(),
         runs: args.runs,
         minutes: args.minutes,
         entries: sums.iter().enumerate().map(entry).collect(),
         delay: all.mean_delay(),
-        level: all.least_mean_delay().map(level_of_service),
+        level: all.least_mean_delay().map(|delay| level_of_lane(delay, all.is_over_capacity())),
         demand: total,
         served: all.served as f64 / hours,
         stayed: all.stayed as f64 / all.came.max(1) as f64,
         removed: all.removed,
+        large: (0.0 < mix.heavy()).then(|| LargeShare::of(mix, &all)),
         crowded: most_crowded as f64 / steps,
     })
 }
@@ -192,10 +197,11 @@ impl Found {
         };
         let length = if self.runs == 1 { "1 run".to_owned() } else { format!("{} runs", self.runs) };
         format!(
-            "{}: cars an hour over {length} of {} min\n{}{away}{removed}{crowded}",
+            "{}: cars an hour over {length} of {} min\n{}{away}{removed}{crowded}{}",
             self.road,
             self.minutes,
-            table(&rows)
+            table(&rows),
+            self.large.as_ref().and_then(LargeShare::note).unwrap_or_default()
         )
     }
 }

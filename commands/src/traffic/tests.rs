@@ -4,7 +4,7 @@ use clap::Parser;
 use offtrack::traffic::Mix;
 use serde_json::Value;
 
-use super::{Args, mix, run, table};
+use super::{Args, Counts, LargeShare, mix, run, table};
 
 #[derive(Parser)]
 struct Program {
@@ -75,12 +75,30 @@ fn a_lane_that_stands_is_at_level_f_before_anybody_stays_away() {
 #[test]
 fn the_manuals_capacity_is_less_where_heavy_vehicles_are() {
     let of = |shares: &[&str]| {
-        let words = [&["20m", "--capacity", "--minutes", "1", "--runs", "1"], shares].concat();
-        json(&words)[0]["hcm"].as_f64().unwrap()
+        let words = [&["20m", "--capacity", "--minutes", "3", "--runs", "2"], shares].concat();
+        json(&words)[0].clone()
     };
-    // Nothing circulates in the first row; a heavy vehicle counts for two cars, a van for one.
+    // Nothing circulates in the first row; a heavy vehicle that came counts for two cars, a van for one.
     let found = of(&["--share", "buses=0.1", "--share", "rigid_trucks=0.15", "--share", "vans=0.3"]);
-    assert!((found - of(&[]) / 1.25).abs() < 1e-3, "{found}");
+    let [asked, came] = ["asked", "came"].map(|key| found["large"][key].as_f64().unwrap());
+    let alone = of(&[]);
+    let expected = alone["hcm"].as_f64().unwrap() / (1.0 + came);
+    assert!((found["hcm"].as_f64().unwrap() - expected).abs() < 1e-3, "{found}");
+    assert!((asked - 0.25).abs() < 1e-6 && 0.05 < came && came < 0.35 && alone["large"].is_null(), "{found} {alone}");
+}
+
+#[test]
+fn large_vehicles_that_a_road_has_no_room_for_are_told_and_do_not_count_for_the_manual() {
+    let shares = ["--share", "tractor_trailers=0.5", "--share", "buses=0.5"];
+    let map = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenarios/maps/zala8.outline.toml");
+    let words = [&[map, "--demand", "900", "--minutes", "20", "--runs", "2"], &shares[..]].concat();
+    let found = json(&words)[0].clone();
+    let [asked, came] = ["asked", "came"].map(|key| found["large"][key].as_f64().unwrap());
+    assert!(asked == 1.0 && came < 0.9, "{found}");
+    let counts = Counts { entered: 1_000, large: 100, ..Counts::default() };
+    let share = |buses| LargeShare::of(Mix { large: [buses, 0.0, 0.0], ..Mix::default() }, &counts);
+    assert_eq!((share(0.125).note(), share(0.1).note()), (None, None), "by chance");
+    assert!(share(0.2).note().is_some_and(|note| note.starts_with("10 % were large, not 20: ")));
 }
 
 #[test]
