@@ -12,8 +12,9 @@ from typing import Any, TypeGuard
 
 import numpy as np
 import numpy.typing as npt
-from gymnasium.vector import AutoresetMode
 
+#: Those of ``gymnasium.vector.AutoresetMode``, which there is from gymnasium 1.1 on.
+MODES = ("next_step", "same_step", "disabled")
 #: Most names of routes that a batch takes: more than any benchmark has routes.
 MOST_NAMES = 10_000_000
 #: Most names of values that a policy reads: more than there are.
@@ -23,9 +24,8 @@ MOST_VALUES = 1000
 def mode_name(name: str, mode: str | enum.Enum) -> str:
     """``"next_step"`` for ``AutoresetMode.NEXT_STEP`` or its name, and so on."""
     given = mode.name if isinstance(mode, enum.Enum) else text(name, mode)
-    known = [other.name.lower() for other in AutoresetMode]
-    if given.lower() not in known:
-        raise ValueError(f'{name}: "{given}"; must be one of {", ".join(known)}')
+    if given.lower() not in MODES:
+        raise ValueError(f'{name}: "{given}"; must be one of {", ".join(MODES)}')
     return given.lower()
 
 
@@ -34,12 +34,12 @@ def checked_seed(seed: int) -> int:
     return within("seed", seed, 0, 2**32)
 
 
-def file_name(file: str | os.PathLike[str]) -> str:
-    """A file's path as text."""
+def file_name(file: str | os.PathLike[str], name: str = "file") -> str:
+    """The path of a file or folder as text."""
     try:
-        return text("file", os.fspath(file))
+        return text(name, os.fspath(file))
     except TypeError:
-        raise TypeError(f"file: {file!r}; the path of a file is needed") from None
+        raise TypeError(f"{name}: {file!r}; the path of a {name} is needed") from None
 
 
 def checked_integer(name: str, value: int) -> int:
@@ -149,7 +149,7 @@ def is_sequence(given: object) -> TypeGuard[Sequence[Any]]:
     return isinstance(given, Sequence | np.ndarray) and not isinstance(given, str) and getattr(given, "ndim", 1) > 0
 
 
-def check_length(name: str, given: Sequence[Any] | None, n: int) -> None:
+def check_length(name: str, given: Sequence[Any] | npt.NDArray[Any] | None, n: int) -> None:
     """An error unless there is one for each truck; before any of them is looked at."""
     if given is None:
         return

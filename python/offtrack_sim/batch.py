@@ -246,10 +246,10 @@ class Batch(_offtrack.Batch):
         self,
         envs: Iterable[int] | None = None,
         *,
-        seeds: Sequence[int | None] | None = None,
+        seeds: Sequence[int | None] | npt.NDArray[np.integer[Any]] | None = None,
         streams: Sequence[tuple[int, int] | None] | None = None,
         routes: Sequence[str | None] | None = None,
-        starts: Sequence[Start | tuple[float, ...] | None] | None = None,
+        starts: Sequence[Start | tuple[Any, ...] | None] | None = None,
     ) -> None:
         """Begins an episode of some trucks and leaves the others as they are.
 

@@ -214,7 +214,7 @@ def _chooser(policy: Policy | Callable[..., Any], n_commands: int) -> _offtrack.
 def _checked(actions: Any, n: int, n_commands: int) -> npt.NDArray[Any]:
     """What a policy gave for ``n`` observations: as indices, numbers with a fraction would lose it where they are
     stored."""
-    found = np.asarray(actions)
+    found = numbers("policy", actions, "an array of integers, or of commands, is needed")
     if n_commands:
         if found.dtype.kind != "f" or found.shape != (n, n_commands):
             needed = f"float32 of shape ({n}, {n_commands}) is needed"

@@ -57,8 +57,9 @@ def save(
         scenario: The benchmark it was trained on, a name or a file: the file keeps its table of actions and, unless
             ``values`` says what it reads, the names of the extras that it observes.
         mean: Mean of each observation's value, ``[n_values]``, extras included, where the network was trained with
-            normalised ones; a model of Stable-Baselines3 with ``VecNormalize`` brings its own. ``[frames * n_values]``
-            where stacks of frames were normalised.
+            normalised ones. A model of Stable-Baselines3 brings those of its environment's ``VecNormalize``; where it
+            was loaded without ``env`` it has none, of which a warning tells. ``[frames * n_values]`` where stacks of
+            frames were normalised.
         variance: Their variance, ``[n_values]``: a value becomes ``(value - mean) / sqrt(variance + epsilon)``, clamped
             to -10..10.
         epsilon: Added to the variance.
@@ -78,7 +79,9 @@ def save(
             elsewhere than at 10, what a model brings itself, and numbers that are not finite.
         OSError: Where the file cannot be written.
     """
-    found = trained.network_of(model, None if squash is None else text("squash", squash))
+    found = trained.network_of(
+        model, None if squash is None else text("squash", squash), says=mean is None and variance is None
+    )
     if frames is not None:
         n = checked_integer("frames", frames)
         if found.frames not in (1, n):

@@ -18,6 +18,8 @@ Doubles = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 #: One number for all trucks, or one for each.
 Numbers = npt.ArrayLike
+#: Indices of trucks, waypoints or vehicles.
+Indices = Sequence[int] | npt.NDArray[np.integer[Any]]
 
 
 class Seen(NamedTuple):
@@ -86,7 +88,7 @@ class Observer(_offtrack.Observer):
         cls,
         scenario: Scenario,
         routes: Iterable[str],
-        vehicles: Sequence[tuple[str, str]] | Sequence[int] | None = None,
+        vehicles: Sequence[tuple[str, str]] | Indices | None = None,
         *,
         num_threads: int | None = None,
     ) -> Observer:
@@ -139,8 +141,8 @@ class Observer(_offtrack.Observer):
         trailer_heading: Numbers,
         speed: Numbers,
         *,
-        waypoint: int | Sequence[int] | None = None,
-        trucks: Sequence[int] | None = None,
+        waypoint: int | Indices | None = None,
+        trucks: Indices | None = None,
     ) -> Seen:
         """Begins an episode of each truck at any place along its route: what lies behind counts as passed.
 
@@ -188,7 +190,7 @@ class Observer(_offtrack.Observer):
         trailer_roll_rate: Numbers = 0.0,
         tractor_load_transfer_ratio: Numbers = 0.0,
         trailer_load_transfer_ratio: Numbers = 0.0,
-        trucks: Sequence[int] | None = None,
+        trucks: Indices | None = None,
     ) -> Seen:
         """The trucks a step later, at poses as :meth:`begin` has them. A truck's first pose begins its episode.
 
@@ -274,7 +276,7 @@ class Observer(_offtrack.Observer):
             raise ValueError(f"vehicle: {vehicle!r}; must be one of {sorted(set(self.vehicles))}")
         return self.dimensions_of(0 if vehicle is None else self.vehicles.index(vehicle))
 
-    def _rows(self, trucks: Sequence[int] | None) -> list[int] | None:
+    def _rows(self, trucks: Indices | None) -> list[int] | None:
         """Indices of trucks, none for all."""
         if trucks is None:
             return None
@@ -328,7 +330,7 @@ def speed_control(observer: Observer, speed: Numbers, target: Numbers) -> Floats
     return observer.accelerations(*speeds)
 
 
-def _vehicles(given: Sequence[tuple[str, str]] | Sequence[int] | None) -> tuple[list[Any] | None, list[Any] | None]:
+def _vehicles(given: Sequence[tuple[str, str]] | Indices | None) -> tuple[list[Any] | None, list[Any] | None]:
     """Vehicles as pairs of names, or as indices; the other is None."""
     if given is None:
         return None, None

@@ -180,6 +180,9 @@ def read(file: str) -> Network:
         node = reader.producers.get(name)
         if node is None:
             raise TypeError(f"{file}: {name!r} comes from no input of the graph")
+        # A recurrent layer's first two outputs are its values; an LSTM's third one is what it remembers.
+        if name not in node.output[: 2 if node.op_type in ("GRU", "LSTM") else 1]:
+            raise TypeError(f"{_named(node)}: its output {name!r} is used, for which a policy file has no place")
         name, found = _passed(reader, node)
         if found is not None:
             passed.append((node, *found))
@@ -228,12 +231,7 @@ def _changes_numbers(reader: _Reader, node: Any) -> bool:
         before = reader.producers.get(node.input[0])
         of_actions = before is not None and before.op_type == "ArgMax"
         types = reader.onnx.TensorProto
-        return not of_actions and reader.attribute(node, "to") not in (
-            types.FLOAT,
-            types.DOUBLE,
-            types.FLOAT16,
-            types.BFLOAT16,
-        )
+        return not of_actions and reader.attribute(node, "to") not in (types.FLOAT, types.DOUBLE)
     if node.op_type == "Transpose":
         order = reader.attribute(node, "perm")
         return order is None or order[-1] != len(order) - 1

@@ -15,7 +15,7 @@ try:
 except ImportError:
     raise ImportError("parallel: pettingzoo is needed; pip install offtrack-sim[pettingzoo]") from None
 
-from .arguments import check_commands, checked_seed, within
+from .arguments import check_commands, checked_seed, numbers, within
 from .batch import Batch
 from .layout import Ended
 from .scenarios import Scenario, whole
@@ -168,7 +168,8 @@ class RoundaboutParallel(ParallelEnv[str, Observation, Any]):
 
     def _checked(self, agent: str, action: Any) -> npt.NDArray[Any]:
         """An agent's action, of the kind that its space has; the batch checks what lies in it."""
-        space, found = self.action_spaces[agent], np.asarray(action)
+        space = self.action_spaces[agent]
+        found = numbers(f"actions[{agent!r}]", action, f"one of {space} is needed")
         kinds = "f" if isinstance(space, gymnasium.spaces.Box) else "iu"
         if found.dtype.kind not in kinds or found.shape != (space.shape or ()):
             raise TypeError(f"actions[{agent!r}]: {action!r}; one of {space} is needed")

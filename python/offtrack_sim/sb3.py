@@ -15,7 +15,7 @@ try:
 except ImportError:
     raise ImportError("sb3: stable-baselines3 is needed; pip install offtrack-sim[sb3]") from None
 
-from .arguments import checked_seed
+from .arguments import checked_seed, within
 from .batch import Batch, Bools
 from .episodes import Floats
 from .layout import Ended
@@ -188,4 +188,5 @@ class RoundaboutVecEnv(VecEnv):
         """The trucks meant."""
         if indices is None:
             return list(range(self.num_envs))
-        return [int(indices)] if isinstance(indices, (int, np.integer)) else [int(env) for env in indices]
+        chosen = [indices] if isinstance(indices, (int, np.integer)) else list(indices)
+        return [within("indices", int(env), 0, self.num_envs) for env in chosen]

@@ -51,7 +51,7 @@ class Benchmark:
             self.text = _offtrack.scenario_of_keys(json.dumps(_plain("", keys)))
         else:
             raise TypeError(f"keys: {keys!r}; a dict of keys or the text of a benchmark file is needed")
-        self.folder = None if folder is None else os.path.abspath(file_name(folder))
+        self.folder = None if folder is None else os.path.abspath(file_name(folder, "folder"))
 
     name: str
     """Its name."""
@@ -247,7 +247,7 @@ def write_scenarios(folder: str | os.PathLike[str]) -> list[Path]:
         FileExistsError: Where a file is there with another text. Nothing is written then.
         OSError: Where a file cannot be read or written.
     """
-    below = Path(file_name(folder))
+    below = Path(file_name(folder, "folder"))
     files = [(below / path, contents) for path, contents in _offtrack.scenario_files()]
     for file, contents in files:
         if file.exists() and file.read_text(encoding="utf-8") != contents:

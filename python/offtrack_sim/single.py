@@ -11,7 +11,7 @@ import gymnasium
 import numpy as np
 import numpy.typing as npt
 
-from .arguments import check_commands, checked_seed, within
+from .arguments import check_commands, checked_seed, numbers, within
 from .batch import Batch
 from .layout import EXTRAS, OBSERVATION, VEHICLES, Ended
 from .scenarios import Scenario
@@ -134,7 +134,7 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], Any]):
     def _row_of(self, action: Any) -> npt.NDArray[Any]:
         """The action as those of a batch of one truck."""
         if isinstance(self.action_space, gymnasium.spaces.Box):
-            command = np.asarray(action)
+            command = numbers("action", action, f"float32 of shape {self.action_space.shape} is needed")
             if command.dtype.kind != "f":
                 raise TypeError(f"action: {action!r}; float32 of shape {self.action_space.shape} is needed")
             if command.shape != self.action_space.shape:

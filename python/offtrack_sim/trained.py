@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
@@ -20,8 +21,9 @@ ACTIVATIONS = {"ReLU": "relu", "Tanh": "tanh"}
 RECURRENT = {"GRU": ("gru", 3), "LSTM": ("lstm", 4)}
 
 
-def network_of(model: Any, squash: str | None) -> Network:
-    """The network of any model that is known; ``squash`` is what the caller says."""
+def network_of(model: Any, squash: str | None, *, says: bool = False) -> Network:
+    """The network of any model that is known; ``squash`` is what the caller says. ``says``: whether a warning is due
+    where nobody knows how the model's observations were normalised."""
     if isinstance(model, Network):
         return model if squash is None else replace(model, squash=squash)
     if isinstance(model, list) and not (model and _is("Module", model[0])):
@@ -43,6 +45,12 @@ def network_of(model: Any, squash: str | None) -> Network:
         space = model.action_space
         if not ((space.low == -1).all() and (space.high == 1).all()):
             raise ValueError(f"action_space: {space}; the policy file's commands lie in -1..1: rescale the actions")
+    if says and getattr(model, "get_env", lambda: model)() is None:
+        message = (
+            "model: has no environment, and a VecNormalize or VecFrameStack around it would count: load it with env=, "
+            "or give mean and variance"
+        )
+        warnings.warn(message, stacklevel=3)
     return replace(found, frames=_frames(model), normalisation=_normalisation_of(model))
 
 
@@ -157,7 +165,7 @@ def _of_modules(modules: list[Any], squash: str | None) -> Network:
         kind = type(module).__name__
         if kind in ACTIVATIONS and last == "Linear":
             activations.add(ACTIVATIONS[kind])
-        elif last != "Linear" and _is("Linear", module):
+        elif last != "Linear" and _is_linear(module):
             layers.append(_linear(module.weight, module.bias))
             kind = "Linear"
         elif last != "Linear" and kind in RECURRENT and (not cells or last == kind):
@@ -256,6 +264,12 @@ def _numbers(name: str, values: npt.ArrayLike) -> npt.NDArray[np.float64]:
 def _is(name: str, thing: Any) -> bool:
     """Whether a class of this name is among the thing's classes."""
     return any(known.__name__ == name for known in type(thing).__mro__)
+
+
+def _is_linear(module: Any) -> bool:
+    """Whether it is a Linear that computes what PyTorch's does: a class that extends it may do more."""
+    linears = [known for known in type(module).__mro__ if known.__name__ == "Linear"]
+    return bool(linears) and getattr(type(module), "forward", None) is getattr(linears[-1], "forward", None)
 
 
 def _kind(thing: Any) -> str:

@@ -24,6 +24,10 @@ pub fn table<'py>(py: Python<'py>, actions: &[Action]) -> PyResult<Bound<'py, Py
 /// `TypeError` for anything but a numpy array of integers or of numbers, of one dimension or of two; `ValueError` for
 /// another length, an action outside the table, and a number outside -1..1.
 pub fn of_array(actions: &Bound<PyAny>, n_envs: usize, world: &World) -> PyResult<Actions> {
+    // What is masked is still there, below.
+    if actions.get_type().name()? == "MaskedArray" {
+        return Err(PyTypeError::new_err("actions: MaskedArray; a plain array is needed, as of its `filled`"));
+    }
     match world.n_commands() {
         0 => indices(actions, n_envs, world.params.n_actions).map(Actions::Indices),
         n_commands => commands(actions, n_envs, n_commands).map(Actions::Commands),

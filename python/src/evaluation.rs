@@ -13,7 +13,7 @@ use offtrack_evaluation::placed::placed;
 use offtrack_evaluation::policies::Controller;
 use offtrack_evaluation::report;
 use offtrack_policy::Choice;
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyMemoryError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::arrays::aligned;
@@ -64,7 +64,16 @@ pub fn drive<'py>(
         let network = network.map(|network| placed(network, &engine, world, Choice::Best)).transpose();
         let mut network = network.map_err(|error| PyValueError::new_err(error.to_string()))?;
         let begun = pool.run(py, || Episodes::begin(engine, world.clone(), &place.routes, episodes, seed))?;
-        let begun = begun.map_err(|error| errors::of_simulator(&error))?;
+        let begun = begun.map_err(|error| match error {
+            Error::BatchTooLarge { fitting, .. } => {
+                let n_routes = place.routes.len();
+                let most = fitting / n_routes as u64;
+                let says =
+                    format!("episodes: {episodes} on each of {n_routes} routes; memory is free for {most} on each");
+                PyMemoryError::new_err(says)
+            }
+            error => errors::of_simulator(&error),
+        })?;
         let figures = Figures::begin(&place.scenario, world, &place.routes, episodes, begun.simulator());
         let mut figures = figures.map_err(|error| errors::of_simulator(&error))?;
         let n_envs = begun.simulator().n_envs();

@@ -2,9 +2,10 @@
 
 mod routes; // those that are to be driven
 
+use std::borrow::Cow;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, TryLockError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, TryLockError};
 use std::time::Duration;
 
 use offtrack::files::cache::{Cache, Loading, Stopped};
@@ -16,7 +17,7 @@ use offtrack::world::{Error, World};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::errors;
+use crate::errors::{self, ScenarioError};
 use routes::RoadFile;
 pub use routes::is_of;
 
@@ -77,7 +78,10 @@ pub struct Asked<'a> {
 }
 
 /// What was baked last.
-static BAKED: Mutex<Vec<Place>> = Mutex::new(Vec::new());
+type Baked = Arc<Mutex<Vec<Place>>>;
+
+/// What this process baked last. Another number is that of the process of which this one is a fork.
+static BAKED: Mutex<Option<(u32, Baked)>> = Mutex::new(None);
 
 impl Place {
     /// A number for all that trucks drive by here.
@@ -88,13 +92,17 @@ impl Place {
     /// Index of a route by its name, which stands in this argument; `known` says of whom the names in the error are.
     pub fn route(&self, argument: &str, name: &str, known: &str) -> PyResult<u32> {
         let names = &self.world.route_names;
-        let of_file = self.files.iter().find_map(|file| file.renamed(name));
-        let name_here = of_file.as_deref().unwrap_or(name);
-        let found = names.iter().position(|route| route == name_here);
+        let name_here = self.name_here(name);
+        let found = names.iter().position(|route| *route == name_here);
         found.map(|index| index as u32).ok_or_else(|| {
             let list = shortened(&names.join(", "), 600);
             PyValueError::new_err(format!("{argument}: {name:?}; {known} {list}"))
         })
+    }
+
+    /// A route or road as it is named here: one of a file after the file's stem.
+    pub fn name_here<'a>(&self, name: &'a str) -> Cow<'a, str> {
+        self.files.iter().find_map(|file| file.renamed(name)).map_or(Cow::Borrowed(name), Cow::Owned)
     }
 
     /// The place that is asked for: from those that were baked last, or baked now, unless `stop` is set on the way.
@@ -115,7 +123,8 @@ impl Place {
         let scenario = change(scenario);
         let limit = asked.max_episode_steps;
         // Held while a world is baked, so that two threads do not bake the same one.
-        let mut baked = baked(stop).map_err(|stopped| PyValueError::new_err(stopped.to_string()))?;
+        let baked = baked();
+        let mut baked = free(&baked, stop).map_err(|stopped| PyValueError::new_err(stopped.to_string()))?;
         let known =
             |place: &&Place| (place.max_episode_steps, place.split) == (limit, split) && *place.scenario == scenario;
         if let Some(place) = baked.iter().find(known) {
@@ -124,7 +133,7 @@ impl Place {
         let same = |place: &&Place| place.max_episode_steps.is_none() && *place.scenario == scenario;
         let mut world = match baked.iter().find(same) {
             Some(place) => (*place.world).clone(),
-            None => World::bake_with(&scenario, &loading).map_err(|error| of_world(&error))?,
+            None => World::bake_with(&scenario, &loading).map_err(|error| of_world(&scenario.name, &error))?,
         };
         if let Some(limit) = limit {
             // The clock of a world lets so many steps pass, and times out in the next one.
@@ -142,10 +151,25 @@ impl Place {
     }
 }
 
+/// What this process baked last. A fork begins with what its parent had; if a thread of the parent was baking, which
+/// will never be done in the fork, with nothing.
+fn baked() -> Baked {
+    let process = std::process::id();
+    let mut held = BAKED.lock().unwrap_or_else(PoisonError::into_inner);
+    match &*held {
+        Some((of, baked)) if *of == process => baked.clone(),
+        of_parent => {
+            let places = of_parent.as_ref().and_then(|(_, baked)| Some(baked.try_lock().ok()?.clone()));
+            let baked = Baked::new(Mutex::new(places.unwrap_or_default()));
+            held.insert((process, baked)).1.clone()
+        }
+    }
+}
+
 /// The places that were baked last, once no other thread bakes.
-fn baked(stop: &AtomicBool) -> Result<MutexGuard<'static, Vec<Place>>, Stopped> {
+fn free<'a>(baked: &'a Baked, stop: &AtomicBool) -> Result<MutexGuard<'a, Vec<Place>>, Stopped> {
     loop {
-        match BAKED.try_lock() {
+        match baked.try_lock() {
             Ok(baked) => return Ok(baked),
             Err(TryLockError::Poisoned(poisoned)) => return Ok(poisoned.into_inner()),
             Err(TryLockError::WouldBlock) if stop.load(Ordering::Relaxed) => return Err(Stopped),
@@ -154,8 +178,11 @@ fn baked(stop: &AtomicBool) -> Result<MutexGuard<'static, Vec<Place>>, Stopped> 
     }
 }
 
-fn of_world(error: &Error) -> PyErr {
-    PyValueError::new_err(error.to_string())
+fn of_world(benchmark: &str, error: &Error) -> PyErr {
+    match error {
+        Error::Invalid(invalid) => ScenarioError::new_err(format!("{benchmark}: {invalid}")),
+        Error::Stopped(stopped) => PyValueError::new_err(stopped.to_string()),
+    }
 }
 
 /// Names of the benchmarks that come with the package.

@@ -156,7 +156,11 @@ def box(low: float, high: float) -> Any:
     return SimpleNamespace(low=np.full(2, low), high=np.full(2, high))
 
 
-def sb3(policy: Any, env: Any = None, actions: Any = None) -> Any:
+#: An environment without wrappers.
+PLAIN = SimpleNamespace()
+
+
+def sb3(policy: Any, env: Any = PLAIN, actions: Any = None) -> Any:
     """An algorithm of Stable-Baselines3 with this policy."""
     return SimpleNamespace(policy=policy, get_env=lambda: env, action_space=actions)
 

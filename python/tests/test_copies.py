@@ -165,6 +165,13 @@ def test_a_pickle_of_a_batch_on_a_road_of_a_file_is_read_in_another_folder(
     batch = Batch("attard2023", 2, routes=["own.toml"], seed=5)
     observer = Observer("attard2023", [f"own.toml/{batch.route_names[0].split('/')[1]}"])
     kept = pickle.dumps((batch, observer))
+    # A copy and the original know the road by any path of the file, and so do weights.
+    route = batch.route_names[0].split("/")[1]
+    for one in (batch, copy.copy(batch)):
+        for path in ("own.toml", "./own.toml", str(tmp_path / "own.toml")):
+            one.begin(routes=[f"{path}/{route}"] * 2)
+    assert Batch("attard2023", 2, routes=["own.toml"], weights={"own.toml": 2.0}).route_names == batch.route_names
+    batch = pickle.loads(kept)[0]
     # A road of a file is not one of the benchmark's that has its name.
     with pytest.raises(ValueError, match="another road of the batch is 16m too: rename one"):
         Batch("attard2023", 2, routes=["./16m.toml"])

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import multiprocessing
+import subprocess
+import sys
+import threading
+import time
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +23,17 @@ ID = "offtrack_sim:offtrack/Roundabout-v0"
 
 def test_gymnasiums_checker_finds_nothing() -> None:
     check_env(gymnasium.make(ID, render_mode="rgb_array").unwrapped)
+
+
+def test_older_versions_of_gymnasium_have_environments_of_one_truck_and_batches() -> None:
+    # As gymnasium before 1.1: its vector environments have no modes.
+    code = (
+        "import gymnasium.vector; del gymnasium.vector.AutoresetMode; import offtrack_sim as sim;"
+        "sim.Roundabout().reset(seed=1); sim.Batch(num_envs=2, autoreset='same_step').step_at_random();"
+        "sim.make_vec(num_envs=2)"
+    )
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert "vector environments need 1.1 or later; Roundabout and Batch do not" in ran.stderr, ran.stderr
 
 
 def test_it_is_made_by_its_id_alone_and_as_a_vector() -> None:
@@ -145,6 +160,33 @@ def test_a_batch_goes_on_in_a_forked_child() -> None:
     there = receiver.recv_bytes()
     process.join()
     assert batch.step(actions)[0].tobytes() == there
+
+
+def test_a_forked_child_does_not_wait_for_a_thread_of_its_parent(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("OFFTRACK_CACHE", str(tmp_path))  # no road is in it
+    long = offtrack_sim.benchmark("random2026").changed({"procedural.seed": 71})
+    thread = threading.Thread(target=lambda: offtrack_sim.Batch(long, num_envs=1))
+    thread.start()
+    context = multiprocessing.get_context("fork")
+    children: list[Any] = []
+
+    def child(sender: Any) -> None:
+        sender.send(offtrack_sim.Batch("attard2023", num_envs=2).num_envs)
+
+    while thread.is_alive() and len(children) < 20:
+        receiver, sender = context.Pipe()
+        process = context.Process(target=child, args=(sender,))
+        process.start()
+        children.append((process, receiver))
+        time.sleep(0.3)
+    thread.join()
+    until = time.monotonic() + 60
+    answered = [receiver.poll(max(0.0, until - time.monotonic())) for _, receiver in children]
+    for process, _ in children:
+        process.kill()
+    assert len(children) > 2 and all(answered), "a child waits for a thread that it does not have"
 
 
 def test_pictures_show_the_truck(tmp_path: Path) -> None:

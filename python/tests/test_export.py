@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -99,6 +100,29 @@ def test_frames_and_statistics_are_those_of_the_models_vector_environments(tmp_p
     clipping.clip_obs = 5.0
     with pytest.raises(ValueError, match="clip_obs is 5; a policy file clips at 10"):
         written(tmp_path, torch.sb3(policy, clipping))
+
+
+def test_a_model_without_its_environment_may_lack_what_normalised_it_and_that_is_said(tmp_path: Path) -> None:
+    policy = torch.on_policy(Linear(69, 9, 1), distribution=torch.CategoricalDistribution())
+    with pytest.warns(UserWarning, match="model: has no environment, and a VecNormalize or VecFrameStack around it"):
+        written(tmp_path, torch.sb3(policy, None))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        written(tmp_path, torch.sb3(policy, SimpleNamespace()))
+        written(tmp_path, torch.sb3(policy, None), mean=np.zeros(69), variance=np.ones(69))
+
+
+def test_a_class_that_extends_linear_and_computes_otherwise_is_refused(tmp_path: Path) -> None:
+    class Lora(Linear):
+        def forward(self, values: Any) -> Any:
+            return 2 * self(values)
+
+    class Named(Linear):
+        pass
+
+    assert same(written(tmp_path, Sequential(Named(69, 9, 1))), Linear(69, 9, 1))
+    with pytest.raises(TypeError, match="layer 0: .*Lora; Linear, GRU or LSTM is needed here"):
+        written(tmp_path, Sequential(Lora(69, 9, 1)))
 
 
 def test_a_module_of_rllib_is_its_encoder_and_its_head(tmp_path: Path) -> None:

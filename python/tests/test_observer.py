@@ -41,7 +41,7 @@ def telemetry(columns: dict[str, npt.NDArray[Any]]) -> dict[str, Any]:
 def test_an_observer_of_any_number_of_trucks_sees_the_bytes_that_the_batch_sees(n: int) -> None:
     batch = Batch("laden2026", n, split="test", seed=3, autoreset="disabled")
     names = [batch.route_names[route] for route in batch.routes()]
-    observer = Observer("laden2026", names, batch.vehicles().tolist())
+    observer = Observer("laden2026", names, batch.vehicles())
     policy = Policy.shipped("laden2026")
     policy.check(observer)
     seen = observer.begin(**pose(batch.columns("truck")["truck"]))
@@ -61,6 +61,11 @@ def test_an_observer_of_any_number_of_trucks_sees_the_bytes_that_the_batch_sees(
         assert np.array_equal(seen.waypoint, columns["progress"]["waypoint"])
         assert np.array_equal(seen.ended, columns["ended"])
     assert steps > 10
+    # Indices may be those that numpy finds.
+    trucks = np.flatnonzero(seen.ended == 0)
+    on_their_way = {name: value[trucks] for name, value in pose(columns["truck"]).items()}
+    again = observer.begin(**on_their_way, waypoint=seen.waypoint[trucks], trucks=trucks)
+    assert np.array_equal(again.waypoint, seen.waypoint[trucks])
 
 
 def test_a_map_has_its_own_frame_and_a_truck_on_a_lane_of_it_is_on_the_lane_of_its_route() -> None:

@@ -137,6 +137,17 @@ def test_a_recurrent_graph_over_time_is_read_as_one_of_a_step(tmp_path: Path) ->
     assert equal(export.from_onnx(file), export.network(policy))
 
 
+def test_what_an_lstm_remembers_is_not_taken_for_its_values(tmp_path: Path) -> None:
+    policy, file = saved(tmp_path, LAYERS["lstm"]), tmp_path / "other.onnx"
+    export.to_onnx(policy, file)
+    model = onnx.load(str(file))
+    squeeze = [node for node in model.graph.node if node.op_type == "Squeeze"][-1]
+    squeeze.input[0] = squeeze.input[0].replace("hidden", "cell")
+    onnx.save(model, str(file))
+    with pytest.raises(TypeError, match="LSTM: its output 'next_cell_1' is used, for which a policy file has no place"):
+        export.from_onnx(file)
+
+
 @pytest.mark.parametrize(
     ("kind", "inputs", "more", "message"),
     [
@@ -152,6 +163,7 @@ def test_a_recurrent_graph_over_time_is_read_as_one_of_a_step(tmp_path: Path) ->
         ("MatMul", ["w", "x"], {}, "node 'y', MatMul: a policy file has no place for it"),
         ("Transpose", ["x"], {}, "it rounds, or moves values among each other"),
         ("Cast", ["x"], {"to": onnx.TensorProto.INT32}, "it rounds, or moves values among each other"),
+        ("Cast", ["x"], {"to": onnx.TensorProto.BFLOAT16}, "it rounds, or moves values among each other"),
         ("Gather", ["x", "last"], {"axis": 1}, "node 'y', Gather: a policy file has no place for it"),
         ("ArgMax", ["x"], {"axis": 0}, "of each row is needed, so the last axis"),
         ("ArgMax", ["x"], {"axis": -2}, "of each row is needed, so the last axis"),

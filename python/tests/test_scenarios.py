@@ -37,7 +37,7 @@ def test_files_that_are_there_are_left_alone_or_refused_before_anything_is_writt
     with pytest.raises(FileExistsError, match=r"attard2023\.toml is there with another text; another folder"):
         offtrack_sim.write_scenarios(tmp_path)
     assert changed.read_text() == "mine" and not gone.exists()
-    with pytest.raises(TypeError, match="file: 3; the path of a file is needed"):
+    with pytest.raises(TypeError, match="folder: 3; the path of a folder is needed"):
         offtrack_sim.write_scenarios(3)  # type: ignore[arg-type]
 
 

@@ -39,7 +39,7 @@ impl Batch {
         let codes = rows::<u32>(next());
         // A truck that goes on in another episode has not ended.
         let code = if truck.held == 1 { codes[env] } else { Ended::Running as u32 };
-        let ended = Ended::from_code(code).unwrap_or(Ended::Running);
+        let ended = Ended::of_column(code);
         let vehicles = Vehicle::around(&self.place.world, &trucks, &rows(next()), env);
         let shown = Shown { truck: &truck, ranges: &ranges, ended, vehicles: &vehicles };
         let picture = camera.draw(&shown);

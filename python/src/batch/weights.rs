@@ -11,8 +11,9 @@ const ENTRIES: usize = 4096;
 /// A table in which each of a place's routes stands as often as its weight says, the place's order kept. A route has
 /// the weight of its own name, else that of its road, else 1; the table is as long for any weights.
 pub(super) fn table(place: &Place, weights: &[(String, f64)]) -> PyResult<Vec<u32>> {
+    let weights: Vec<_> = weights.iter().map(|(name, weight)| (place.name_here(name), *weight)).collect();
     let names: Vec<&str> = place.routes.iter().map(|&route| place.world.route_names[route as usize].as_str()).collect();
-    for (name, weight) in weights {
+    for (name, weight) in &weights {
         if !(weight.is_finite() && 0.0 <= *weight && *weight <= 1e6) {
             return Err(PyValueError::new_err(format!("weights[{name:?}]: {weight}; must lie in 0..1e6")));
         }

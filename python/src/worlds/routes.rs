@@ -1,5 +1,8 @@
 //! The routes that are to be driven: a split, or routes by their names, which are those of the command line.
 
+use std::fs;
+use std::path::PathBuf;
+
 use offtrack::files::reader::shortened;
 use offtrack::files::shipped::Kind;
 use offtrack::map::procedural;
@@ -19,14 +22,26 @@ const LONGEST_NAME: usize = 100;
 pub struct RoadFile {
     /// As the caller names it.
     path: String,
+    /// Where it lies, of a file.
+    file: Option<PathBuf>,
     /// As its routes are named: after the stem of a file.
     name: String,
 }
 
 impl RoadFile {
-    /// The name of a route, or of the road, that is named by the file's path.
+    fn new(path: &str, name: &str) -> RoadFile {
+        RoadFile { path: path.to_owned(), file: fs::canonicalize(path).ok(), name: name.to_owned() }
+    }
+
+    /// The name of a route, or of the road, that is named by the file's path: as the caller named it, or another one of
+    /// the same file.
     pub fn renamed(&self, name: &str) -> Option<String> {
-        name.strip_prefix(&self.path).map(|rest| format!("{}{rest}", self.name))
+        let of_same_file = || {
+            let road = road_of(name)?;
+            let is_same = self.file.is_some() && fs::canonicalize(road).ok() == self.file;
+            is_same.then(|| &name[road.len()..])
+        };
+        name.strip_prefix(&self.path).or_else(of_same_file).map(|rest| format!("{}{rest}", self.name))
     }
 }
 
@@ -78,7 +93,7 @@ pub fn narrow(
                 "routes: {name:?}; another road of the batch is {other} too: rename one"
             )));
         }
-        let file = RoadFile { path: road.to_owned(), name: roundabout.name.clone() };
+        let file = RoadFile::new(road, &roundabout.name);
         wanted.extend(names.iter().filter_map(|name| file.renamed(name)));
         files.push(file);
         scenario.add(roundabout, Split::Test).map_err(|error| errors::of_reader(&error))?;
