@@ -25,7 +25,7 @@ pub(crate) use tracks::packed;
 const TEMPLATE: &str = concat!(include_str!("page/head.html"), include_str!("page/report.html"));
 const STYLE: &str = concat!(include_str!("page/theme.css"), include_str!("page/style.css"));
 /// Scripts in the order of the page; the last one starts the others.
-const SCRIPTS: [&str; 16] = [
+const SCRIPTS: [&str; 17] = [
     include_str!("page/elements.js"),
     include_str!("page/packed.js"),
     include_str!("page/truck.js"),
@@ -37,6 +37,7 @@ const SCRIPTS: [&str; 16] = [
     include_str!("page/curves.js"),
     include_str!("page/training.js"),
     include_str!("page/scene.js"),
+    include_str!("page/clock.js"),
     include_str!("page/replay.js"),
     include_str!("page/profiles.js"),
     include_str!("page/classes.js"),

@@ -17,12 +17,13 @@ use crate::tabular::html_text;
 
 const TEMPLATE: &str = concat!(include_str!("head.html"), include_str!("comparison.html"));
 const STYLE: &str = concat!(include_str!("theme.css"), include_str!("style.css"), include_str!("comparison.css"));
-const SCRIPTS: [&str; 6] = [
+const SCRIPTS: [&str; 7] = [
     include_str!("elements.js"),
     include_str!("packed.js"),
     include_str!("truck.js"),
     include_str!("data.js"),
     include_str!("scene.js"),
+    include_str!("clock.js"),
     include_str!("comparison.js"),
 ];
 

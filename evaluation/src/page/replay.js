@@ -19,10 +19,7 @@ const truckOf = ({ vehicle, load }) => (load === undefined ? "" : `${vehicle}, $
 class Replay {
   constructor(page) {
     this.page = page;
-    this.frame = 0;
-    this.playing = false;
-    /** Calls back for the next picture. */
-    this.onFrame = (callback) => requestAnimationFrame(callback);
+    this.clock = new Clock(page.ground.step, () => this.show(), () => Number(byId("rate").value));
     /** Called when another route is open. */
     this.onRoute = () => {};
     this.canvas = byId("scene");
@@ -92,8 +89,7 @@ class Replay {
     const moments = Array.from({ length: episode.n_frames }, (_, frame) => instant(this.page, episode, frame));
     byId("readings").replaceChildren(...READINGS.map(([name, value]) =>
       html("div", {}, html("dt", {}, name), html("dd", {}), sparkline(moments.map(value)))));
-    byId("scrub").max = episode.n_frames - 1;
-    this.seek(Number((seconds / this.page.ground.step).toFixed(6)));
+    this.clock.open(episode.n_frames - 1, Number((seconds / this.page.ground.step).toFixed(6)));
   }
 
   /** Opens the episode that the address names; false if it names none. */
@@ -110,49 +106,15 @@ class Replay {
     return true;
   }
 
-  seek(frame) {
-    this.frame = Math.min(Math.max(frame, 0), this.episode.n_frames - 1);
-    this.show();
-  }
-
   show() {
-    const { page, episode, frame } = this, now = instant(page, episode, frame);
+    const { page, episode, clock: { frame } } = this, now = instant(page, episode, frame);
     drawScene(this.canvas, this.scene, now, frame, { rays: byId("rays").checked, follow: byId("follow").checked });
-    byId("scrub").value = frame;
-    byId("scrub").setAttribute("aria-valuetext", `${decimal(now.time, 1)} s`);
-    byId("clock").textContent = `${decimal(now.time, 1)} / ${decimal(episode.seconds, 1)}${GAP}s`;
     const along = (100 * frame) / Math.max(episode.n_frames - 1, 1);
     READINGS.forEach(([, value, words], index) => {
       const reading = byId("readings").children[index];
       reading.querySelector("dd").textContent = words(value(now));
       for (const end of ["x1", "x2"]) reading.querySelector(".cursor").setAttribute(end, along);
     });
-  }
-
-  play(playing) {
-    // At the end, playing starts again.
-    if (playing && this.frame >= this.episode.n_frames - 1) this.seek(0);
-    this.playing = playing;
-    showPlaying(byId("play"), playing);
-    if (!playing) return;
-    let before = performance.now();
-    const turn = (this.turnOfPlay = {});
-    const tick = () => {
-      // Another press has begun another loop.
-      if (!this.playing || turn !== this.turnOfPlay) return;
-      const time = performance.now(), passed = (time - before) / 1000;
-      before = time;
-      this.seek(this.frame + (passed * Number(byId("rate").value)) / this.page.ground.step);
-      if (this.frame >= this.episode.n_frames - 1) this.play(false);
-      else this.onFrame(tick);
-    };
-    this.onFrame(tick);
-  }
-
-  /** Some frames forwards or back, from a whole frame. */
-  step(frames) {
-    this.play(false);
-    this.seek(Math.round(this.frame) + frames);
   }
 
   /** The next episode of the list, or the previous one. */
@@ -170,7 +132,7 @@ class Replay {
     const visible = box.top < window.innerHeight && 0 < box.bottom;
     if (!inside && !(event.target === document.body && visible)) return;
     const actions = {
-      " ": () => this.play(!this.playing), ArrowLeft: () => this.step(event.shiftKey ? -10 : -1), ArrowRight: () => this.step(event.shiftKey ? 10 : 1),
+      " ": () => this.clock.play(!this.clock.playing), ArrowLeft: () => this.clock.move(event.shiftKey ? -10 : -1), ArrowRight: () => this.clock.move(event.shiftKey ? 10 : 1),
       // Outside the replay these two scroll the page.
       ...(inside ? { ArrowUp: () => this.turn(-1), ArrowDown: () => this.turn(1) } : {}),
     };
@@ -181,8 +143,6 @@ class Replay {
 
   listen() {
     byId("route").addEventListener("change", (event) => this.openRoute(event.target.value));
-    byId("play").addEventListener("click", () => this.play(!this.playing));
-    byId("scrub").addEventListener("input", (event) => { this.play(false); this.seek(Number(event.target.value)); });
     for (const id of ["rays", "follow"]) byId(id).addEventListener("change", () => this.show());
     document.addEventListener("keydown", (event) => this.onKey(event));
     window.addEventListener("hashchange", () => this.openLink());

@@ -81,26 +81,26 @@ const CHECKS = {
     const drawn = () => Array.from(replay.canvas.getContext("2d").getImageData(0, 0, replay.canvas.width, replay.canvas.height).data).reduce((sum, value, index) => (sum * 31 + value * (index % 251)) >>> 0, 7);
     const key = (name) => replay.canvas.dispatchEvent(new KeyboardEvent("keydown", { key: name, bubbles: true, cancelable: true }));
     // A browser without a screen may never ask for a picture: a timer stands in.
-    replay.onFrame = (callback) => setTimeout(callback, 16);
-    replay.seek(0);
+    replay.clock.onFrame = (callback) => setTimeout(callback, 16);
+    replay.clock.seek(0);
     const start = drawn();
     key(" ");
-    holds(replay.playing, "space plays");
-    for (let waited = 0; waited < 200 && replay.frame < 2; waited++) await new Promise((done) => setTimeout(done, 20));
-    holds(2 <= replay.frame, `the replay advances: frame ${replay.frame}`);
+    holds(replay.clock.playing, "space plays");
+    for (let waited = 0; waited < 200 && replay.clock.frame < 2; waited++) await new Promise((done) => setTimeout(done, 20));
+    holds(2 <= replay.clock.frame, `the replay advances: frame ${replay.clock.frame}`);
     key(" ");
-    holds(!replay.playing, "space pauses");
+    holds(!replay.clock.playing, "space pauses");
     holds(drawn() !== start, "another frame is another picture");
-    const before = Math.round(replay.frame);
+    const before = Math.round(replay.clock.frame);
     key("ArrowRight");
-    same(replay.frame, before + 1, "one frame on");
+    same(replay.clock.frame, before + 1, "one frame on");
     byId("rays").click();
     const without = drawn();
     byId("rays").click();
     holds(drawn() !== without, "sensors are drawn");
     byId("scrub").value = replay.episode.n_frames - 1;
     byId("scrub").dispatchEvent(new Event("input"));
-    same(replay.frame, replay.episode.n_frames - 1, "the last frame");
+    same(replay.clock.frame, replay.episode.n_frames - 1, "the last frame");
   },
   "the replay shows the truck that was driven": ({ page, replay }) => {
     const { ground, episodes } = page, used = new Set(episodes.map((episode) => episode.rig));
