@@ -214,7 +214,8 @@ impl Observer {
     ///
     /// # Errors
     ///
-    /// [`Error::UnknownAction`], and [`Error::NeedsCommands`] where actions are continuous.
+    /// [`Error::UnknownAction`], [`Error::NeedsCommands`] where actions are continuous, and [`Error::ImpossibleValue`]
+    /// for a speed that no truck can have.
     pub fn command(&self, action: u32, target_speed: f32) -> Result<Action, Error> {
         if self.world.is_continuous() {
             return Err(Error::NeedsCommands);
@@ -222,6 +223,7 @@ impl Observer {
         let Some(asked) = self.world.actions.get(action as usize) else {
             return Err(Error::UnknownAction { env: 0, action, limit: self.world.params.n_actions });
         };
+        checked::target(target_speed)?;
         Ok(self.targeted(asked, target_speed))
     }
 
@@ -229,12 +231,13 @@ impl Observer {
     ///
     /// # Errors
     ///
-    /// [`Error::NeedsIndices`] and [`Error::UnknownCommand`].
+    /// [`Error::NeedsIndices`], [`Error::UnknownCommand`] and [`Error::ImpossibleValue`].
     pub fn commanded(&self, command: &Command, target_speed: f32) -> Result<Action, Error> {
         if !self.world.is_continuous() {
             return Err(Error::NeedsIndices);
         }
         check_command(0, command)?;
+        checked::target(target_speed)?;
         let asked = commanded(&self.world.actions[0], &self.world.actions[1], command);
         Ok(self.targeted(&asked, target_speed))
     }

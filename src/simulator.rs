@@ -310,8 +310,8 @@ impl Simulator {
         self.batch.steps_at_random(&self.world, 1);
     }
 
-    /// As many such steps, one after the other: on a device they are submitted at once, so that the host does less for
-    /// each.
+    /// As many such steps, one after the other. On a device they are one submission, so that the host does less for
+    /// each; it takes memory for each, and a driver may end one that lasts for seconds, so thousands are several calls.
     pub fn steps_at_random(&mut self, n_steps: usize) {
         self.batch.steps_at_random(&self.world, n_steps);
     }

@@ -8,7 +8,7 @@ mod step_limits;
 mod traffic;
 
 use std::f64::consts::PI;
-use std::sync::atomic::AtomicU64;
+use std::sync::Mutex;
 
 use glam::{DVec2, Vec2};
 use rayon::prelude::*;
@@ -300,7 +300,7 @@ fn rigs(scenario: &Scenario, substep: f32) -> (Vec<Rig>, Vec<[Ray; N_RAYS]>) {
 
 /// The field of every roundabout, and that of its trailers where it has an apron.
 fn fields(scenario: &Scenario, loading: &Loading) -> Result<(Vec<Field>, Vec<Option<Field>>), Stopped> {
-    let done = AtomicU64::new(0);
+    let done = Mutex::new(0);
     let field = |place: &Place| {
         loading.check()?;
         let kerbs = place.roundabout.unit_kerbs(scenario.gutter);

@@ -118,7 +118,8 @@ fn row(args: &Args, file: &Path, entry: &Entry) -> Result<Row, Error> {
             let scenario = driver.on_roads(seed, args.roads)?;
             let episodes = usual_episodes(scenario.split(Split::Test).len());
             let drive = Drive { split: Split::Test.name().into(), episodes, claim: None, ..entry.home.clone() };
-            Some(Stretch::of(&drive, &driver.driven(&scenario, Split::Test, &drive)?))
+            let benchmark = format!("{} on {} roads of wide/{seed}", drive.benchmark, args.roads);
+            Some(Stretch { benchmark, ..Stretch::of(&drive, &driver.driven(&scenario, Split::Test, &drive)?) })
         }
         None => None,
     };

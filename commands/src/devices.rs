@@ -21,6 +21,11 @@ pub struct Choice {
 }
 
 impl Choice {
+    /// Whether it is the processor.
+    pub fn is_processor(&self) -> bool {
+        self.device != "gpu"
+    }
+
     /// Opens the device.
     pub fn open(&self) -> Result<Device, Error> {
         match (self.device.as_str(), &self.adapter) {

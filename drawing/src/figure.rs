@@ -41,7 +41,7 @@ pub fn roundabout(roundabout: &Road, routes: &[Route], straights: Straights, gut
         .add(road.routes())
         .add(road.arm_names());
     let legend: Vec<Entry> = road.legend().into_iter().chain(road.route_legend()).collect();
-    let kind = if roundabout.island_radius() == 0.0 { "Junction" } else { "Roundabout" };
+    let kind = if roundabout.has_ring() { "Roundabout" } else { "Junction" };
     let title = format!("{kind} {}: {} arms, {} routes", roundabout.name, roundabout.arms().count(), routes.len());
     let lanes: Vec<String> = roundabout.lane_radii().iter().map(|radius| format!("{radius:.2} m")).collect();
     let radius = roundabout.outer_radius();

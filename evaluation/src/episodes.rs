@@ -65,6 +65,6 @@ impl Episodes {
         // A device that failed in the last step reports it here.
         self.simulator.wait()?;
         let codes = seen::ended(&self.simulator)?;
-        Ok(codes.iter().map(|&code| Ended::from_code(code).unwrap_or(Ended::Running)).collect())
+        Ok(codes.iter().map(|&code| Ended::of_column(code)).collect())
     }
 }

@@ -1,5 +1,6 @@
 //! Evaluates a policy: a number of episodes on every route of a split, every one counted.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use crate::recording::{Recorder, Track};
@@ -114,6 +115,11 @@ impl Evaluation<'_> {
                 expected: format!("the benchmark {} has no such routes", scenario.name),
             });
         }
+        if 1 < world.group() {
+            let message =
+                format!("traffic.group: {}; an evaluation drives trucks alone: leave the key out", world.group());
+            return Err(Error::contents(Path::new(&scenario.name), message));
+        }
         Ok(Episodes::begin(device.engine.clone(), world.clone(), routes, episodes, seed)?)
     }
 
@@ -164,7 +170,7 @@ impl Evaluation<'_> {
                 Some(RouteReport {
                     name: route.name.clone(),
                     own_lane_suffices,
-                    island_radius: place.roundabout.island_radius(),
+                    island_radius: place.roundabout.has_ring().then(|| place.roundabout.island_radius()),
                     summary,
                 })
             });

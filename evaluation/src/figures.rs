@@ -89,7 +89,7 @@ impl<'a> Figures<'a> {
             });
             let apron = self.world.has_apron(truck.route).then(|| depth_on_apron(self.world, truck));
             if running.follow(self.world.rig(truck), &self.lanes[route], around.as_ref(), apron, seen, env) {
-                *finished = Some(running.finish(Ended::from_code(seen.ended[env]).unwrap_or(Ended::Running)));
+                *finished = Some(running.finish(Ended::of_column(seen.ended[env])));
                 n_ended += 1;
             }
         }

@@ -36,6 +36,18 @@ pub fn print_json(text: &str) -> Result<(), Error> {
     print(&(shown + "\n"))
 }
 
+/// JSON of what ends with a list: `head` has that list empty, and each of its `rows` gets a line.
+///
+/// # Errors
+///
+/// A row that cannot be written as JSON, and a head whose last key is no list.
+pub(crate) fn json_lines(head: &str, rows: &[impl Serialize]) -> serde_json::Result<String> {
+    let open = head.strip_suffix('}').and_then(|head| head.trim_end().strip_suffix(']'));
+    let open = open.ok_or_else(|| serde::ser::Error::custom("the last key is no list"))?;
+    let rows: Vec<String> = rows.iter().map(serde_json::to_string).collect::<Result<_, _>>()?;
+    Ok(format!("{open}\n{}\n]}}", rows.join(",\n")))
+}
+
 /// Says one line on standard error, after the program's name. Nobody may be reading it: then the work goes on.
 pub fn say(line: &str) {
     let _ = writeln!(std::io::stderr(), "offtrack: {}", printable(line));

@@ -40,7 +40,7 @@ mod sequences; // the actions of episodes
 mod evaluation; // every route, every start, every episode counted
 mod part; // entry, ring and exit of a route
 mod running; // an episode under way
-mod tabular; // rows as Markdown, LaTeX, CSV
+pub mod tabular; // rows as Markdown, LaTeX, CSV
 pub mod seeds; // figures of several seeds
 mod rank; // percentiles
 pub mod interval; // intervals over routes, by bootstrap

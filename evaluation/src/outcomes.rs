@@ -77,9 +77,7 @@ impl Outcomes {
     /// As JSON: a line for each route.
     pub fn json(&self) -> serde_json::Result<String> {
         let head = serde_json::to_string(&Outcomes { routes: Vec::new(), ..self.clone() })?;
-        let routes: Vec<String> = self.routes.iter().map(serde_json::to_string).collect::<Result<_, _>>()?;
-        // `routes` is the last key, so the head ends with its empty list.
-        Ok(format!("{}\n{}\n]}}", head.trim_end_matches("]}"), routes.join(",\n")))
+        crate::files::json_lines(&head, &self.routes)
     }
 
     /// What is wrong with outcomes that were read: key, value and what would do.

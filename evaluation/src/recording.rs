@@ -194,7 +194,7 @@ impl Recorder {
             track
                 .vehicles
                 .extend(world.traffic.iter().map(|_| Vehicle::around(world, &batch.truck, &batch.cars, track.env)));
-            track.ended = Ended::from_code(batch.ended[track.env]).unwrap_or(Ended::Running);
+            track.ended = Ended::of_column(batch.ended[track.env]);
         }
     }
 

@@ -22,8 +22,8 @@ pub struct RouteReport {
     /// and
     /// rollover are not asked: they depend on the speed, which is the policy's.
     pub own_lane_suffices: bool,
-    /// Radius of the roundabout's island (m).
-    pub island_radius: f64,
+    /// Radius of the roundabout's island (m); `None` on a crossing.
+    pub island_radius: Option<f64>,
     /// Figures of its episodes.
     #[serde(flatten)]
     pub summary: Summary,

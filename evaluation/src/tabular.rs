@@ -2,10 +2,13 @@
 
 use std::fmt::Write;
 
+use offtrack::files::reader::printable;
+
 /// Rows of equally many cells as a Markdown table with aligned columns.
 pub(crate) fn markdown(rows: &[Vec<String>]) -> String {
-    let rows: Vec<Vec<String>> =
-        rows.iter().map(|row| row.iter().map(|cell| cell.replace('|', "\\|")).collect()).collect();
+    // What escapes a bar would be escaped by a backslash before it.
+    let cell = |cell: &String| printable(cell).replace("\\|", "\\\\|").replace('|', "\\|");
+    let rows: Vec<Vec<String>> = rows.iter().map(|row| row.iter().map(cell).collect()).collect();
     let n_columns = rows.first().map_or(0, Vec::len);
     let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
     let widths: Vec<usize> = (0..n_columns).map(width).collect();
@@ -29,7 +32,7 @@ pub(crate) fn latex(rows: &[Vec<String>]) -> String {
     let n_columns = rows.first().map_or(0, Vec::len);
     let mut text = format!("\\begin{{tabular}}{{l{}}}\n\\toprule\n", "r".repeat(n_columns.saturating_sub(1)));
     for (index, row) in rows.iter().enumerate() {
-        let cells: Vec<String> = row.iter().map(|cell| escaped(cell)).collect();
+        let cells: Vec<String> = row.iter().map(|cell| escaped(&printable(cell))).collect();
         text += &format!("{} \\\\\n", cells.join(" & "));
         if index == 0 {
             text += "\\midrule\n";
@@ -73,13 +76,13 @@ pub(crate) fn html_text(text: &str) -> String {
 }
 
 /// The same as CSV (RFC 4180).
-pub(crate) fn csv(rows: &[Vec<String>]) -> String {
+pub fn csv(rows: &[Vec<String>]) -> String {
     let line = |row: &Vec<String>| row.iter().map(|cell| quoted(cell)).collect::<Vec<_>>().join(",") + "\n";
     rows.iter().map(line).collect()
 }
 
 /// A cell of CSV.
-pub(crate) fn quoted(cell: &str) -> String {
+pub fn quoted(cell: &str) -> String {
     if cell.contains([',', '"', '\n', '\r']) { format!("\"{}\"", cell.replace('"', "\"\"")) } else { cell.to_owned() }
 }
 
@@ -102,6 +105,8 @@ mod tests {
     fn a_cell_of_markdown_does_not_end_at_a_bar_and_columns_are_aligned() {
         let rows = [vec!["a|b".into(), "c".into()], vec!["µ".into(), "de".into()]];
         assert_eq!(markdown(&rows), "| a\\|b | c  |\n|------|----|\n| µ    | de |\n");
+        let rows = [vec!["a\nb".into()], vec!["c\\|d\\".into()]];
+        assert_eq!(markdown(&rows), "| a\\nb    |\n|---------|\n| c\\\\\\|d\\ |\n");
     }
 
     #[test]

@@ -12,7 +12,8 @@ use std::thread::ThreadId;
 use crate::error::Error;
 
 /// Folders of the project, below [`root`].
-const OWN: [&str; 8] = ["src/", "cli/", "drawing/", "evaluation/", "learner/", "policy/", "python/", "reference/"];
+const OWN: [&str; 10] =
+    ["src/", "cli/", "commands/", "drawing/", "evaluation/", "learner/", "policy/", "python/", "reference/", "web/"];
 
 /// Panics since work began that may panic, and how many such works are under way.
 static WATCHED: Mutex<Watched> = Mutex::new(Watched { n_works: 0, panics: Vec::new() });
@@ -135,6 +136,21 @@ mod tests {
             "C:\\Users\\user\\.cargo\\registry\\src\\index\\wgpu-30.0.0\\src\\lib.rs",
         ] {
             assert!(!is_own(library), "{library}");
+        }
+    }
+
+    #[test]
+    fn every_crate_of_the_workspace_is_the_projects() {
+        let manifest: toml::Table = include_str!("../../Cargo.toml").parse().unwrap();
+        let members = manifest["workspace"]["members"].as_array().unwrap();
+        assert!(5 < members.len());
+        for member in members {
+            let folder = match member.as_str().unwrap() {
+                "." => String::new(),
+                member => format!("{member}/"),
+            };
+            let file = format!("{}{folder}src/lib.rs", root());
+            assert!(is_own(&file), "{file}");
         }
     }
 

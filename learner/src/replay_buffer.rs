@@ -132,7 +132,7 @@ impl<const N: usize> ReplayBuffer<N> {
         }
         for (env, &code) in rows.ended.iter().enumerate() {
             let row = first + env;
-            let ended = Ended::from_code(code).unwrap_or(Ended::Running);
+            let ended = Ended::of_column(code);
             if self.after[row] == After::Truncated {
                 self.truncated.remove(&row);
             }

@@ -163,7 +163,7 @@ pub enum Error {
         n_envs: usize,
     },
     /// An action outside the table.
-    #[error("actions[{env}]: {action}; must lie in 0..{limit}")]
+    #[error("actions[{env}]: {action}; must lie in 0..{}", .limit - 1)]
     UnknownAction {
         /// Index of its truck.
         env: usize,

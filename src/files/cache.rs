@@ -7,8 +7,8 @@
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::SystemTime;
 
 use crate::files::reader::shown_path;
@@ -73,10 +73,12 @@ impl Loading<'_> {
         if self.stop.load(Ordering::Relaxed) { Err(Stopped) } else { Ok(()) }
     }
 
-    /// Counts a road of `total` as done and tells the watcher.
-    pub(crate) fn count(&self, what: &'static str, done: &AtomicU64, total: usize) {
-        let done = done.fetch_add(1, Ordering::Relaxed) as usize + 1;
-        (self.watcher)(Progress { what, done, total });
+    /// Counts a road of `total` as done and tells the watcher, one thread after the other, so that it hears no number
+    /// after a higher one.
+    pub(crate) fn count(&self, what: &'static str, done: &Mutex<usize>, total: usize) {
+        let mut done = done.lock().unwrap_or_else(PoisonError::into_inner);
+        *done += 1;
+        (self.watcher)(Progress { what, done: *done, total });
     }
 }
 

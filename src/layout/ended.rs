@@ -46,6 +46,13 @@ impl Ended {
         Ended::ALL.get(code as usize).copied()
     }
 
+    /// What this number of an `ended` column says. Columns that were made or checked here hold known ones alone.
+    pub fn of_column(code: u32) -> Ended {
+        let ended = Ended::from_code(code);
+        debug_assert!(ended.is_some(), "ended: {code}");
+        ended.unwrap_or(Ended::Running)
+    }
+
     /// The task itself is over: the value of the state after it is 0.
     pub fn terminated(self) -> bool {
         !matches!(self, Ended::Running | Ended::TimedOut)

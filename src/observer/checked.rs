@@ -70,6 +70,11 @@ pub(super) fn waypoint(found: u32, n_waypoints: u32) -> Result<(), Error> {
 /// An error for a speed or a target that no truck can have.
 pub(super) fn speeds(speed: f32, target: f32) -> Result<(), Error> {
     within(|| "speed".to_owned(), speed, -FASTEST..=FASTEST)?;
+    self::target(target)
+}
+
+/// An error for a target speed that no truck can have.
+pub(super) fn target(target: f32) -> Result<(), Error> {
     within(|| "target".to_owned(), target, -FASTEST..=FASTEST)
 }
 

@@ -116,6 +116,7 @@ impl Scenario {
         within("cell", self.cell, [0.05, 2.0])?;
         let positive = [
             ("step", self.step),
+            ("spacing", self.spacing),
             ("sensor_range", self.sensor_range),
             ("stray_distance", self.stray_distance),
             ("jackknife_angle", self.jackknife_angle),
@@ -221,7 +222,7 @@ fn check_suspension(key: &str, suspension: &Suspension) -> Result<(), Invalid> {
     within(&format!("{key}.centre_of_gravity"), suspension.centre_of_gravity, POSITIVE)?;
     within(&format!("{key}.roll_centre"), suspension.roll_centre, FINITE)?;
     within(&format!("{key}.track"), suspension.track, POSITIVE)?;
-    within(&format!("{key}.roll_gain"), suspension.roll_gain, FINITE)?;
+    within(&format!("{key}.roll_gain"), suspension.roll_gain, POSITIVE)?;
     within(&format!("{key}.roll_frequency"), suspension.roll_frequency, POSITIVE)?;
     within(&format!("{key}.roll_damping"), suspension.roll_damping, [0.0, 0.9999])
 }

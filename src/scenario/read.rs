@@ -14,6 +14,9 @@ use crate::layout::MOST_IN_GROUP;
 use crate::traffic::together;
 use crate::vehicle::Vehicle;
 
+/// Most sub-steps of a step that a file may ask for.
+const MOST_SUBSTEPS: usize = 100;
+
 impl Scenario {
     /// Reads and checks a benchmark file.
     pub(super) fn from_source(source: &Source, loading: &Loading) -> Result<Scenario, Error> {
@@ -51,12 +54,26 @@ impl Scenario {
             return Err(reader.invalid("time.step", format_args!("{} s", scenario.step), expected));
         }
         let [fewest, most] = scenario.substeps();
+        let most = most.min(MOST_SUBSTEPS as f64);
         if !(fewest..=most).contains(&f64::from(scenario.n_substeps)) {
-            let expected = format!(
-                "must lie in {fewest}..{most}: at most the trailer's lever is driven in a sub-step, which takes 1 ms \
-                 at least"
-            );
+            let why = "at most the trailer's lever is driven in a sub-step, which takes 1 ms at least";
+            let expected = if fewest <= most {
+                format!("must lie in {fewest}..{most}: {why}")
+            } else {
+                format!("{fewest} would be needed, and {most} are the most: {why}; shorten time.step")
+            };
             return Err(reader.invalid("time.substeps", scenario.n_substeps, expected));
+        }
+        if scenario.stray_distance < scenario.spacing {
+            let expected = format!(
+                "must be at least routes.spacing, {} m: a truck that begins is so far from the next waypoint",
+                scenario.spacing
+            );
+            return Err(reader.invalid(
+                "ending.stray_distance",
+                format_args!("{} m", scenario.stray_distance),
+                expected,
+            ));
         }
         if scenario.traffic.is_some() && scenario.step as f32 != crate::traffic::STEP {
             let expected = format!("with [traffic] {} s", crate::traffic::STEP);
@@ -98,7 +115,7 @@ fn without_routes(
         fleet,
         gutter: written.gutter,
         step: reader.within("time.step", time.step, 0.01..=1.0, "s")?,
-        n_substeps: reader.count("time.substeps", time.substeps, 1..=100)? as u32,
+        n_substeps: reader.count("time.substeps", time.substeps, 1..=MOST_SUBSTEPS)? as u32,
         cell: reader.within("field.cell", field.cell, 0.1..=1.0, "m")?,
         action_kind: actions.kind,
         steer_levels: steer_levels(reader, actions)?,

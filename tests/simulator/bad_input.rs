@@ -352,7 +352,7 @@ fn a_batch_that_cannot_be_is_refused_and_a_wrong_action_changes_nothing() {
         assert_eq!(new(4, RouteChoice::Fixed(vec![0])), simulator::Error::RouteCount { n_routes: 1, n_envs: 4 });
         let mut simulator = batch_on(&engine, &world, 2, 0, RouteChoice::Drawn(vec![0]));
         let before = simulator.batch().truck.clone();
-        assert_eq!(simulator.step(&[0, 9]).unwrap_err().to_string(), "actions[1]: 9; must lie in 0..9");
+        assert_eq!(simulator.step(&[0, 9]).unwrap_err().to_string(), "actions[1]: 9; must lie in 0..8");
         assert_eq!(simulator.step(&[0]).unwrap_err().to_string(), "actions: 1 for 2 trucks; one each is needed");
         let start = |offset| offtrack::layout::Start { offset, ..Default::default() };
         let refused =

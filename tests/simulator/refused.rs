@@ -4,6 +4,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use offtrack::files::cache::Loading;
 use offtrack::layout::{Column, Stream};
 use offtrack::scenario::{ActionKind, Scenario};
 use offtrack::simulator::{Begin, Error, RouteChoice, Simulator};
@@ -82,6 +83,8 @@ fn a_scenario_changed_in_memory_is_checked_before_it_is_baked() {
     assert_eq!(coarse, "n_substeps: 1; must lie in 2..1000");
     assert_eq!(refused(|scenario| scenario.n_substeps = 101), "n_substeps: 101; must lie in 1..100");
     assert!(refused(|scenario| scenario.cell = 1e-9).starts_with("cell: 0.000000001; "));
+    let rigid = refused(|scenario| scenario.vehicle.tractor.suspension.roll_gain = 0.0);
+    assert!(rigid.starts_with("vehicle.tractor.suspension.roll_gain: 0; must lie in 0.000001.."), "{rigid}");
 }
 
 #[test]
@@ -101,9 +104,10 @@ fn brakes_that_drive_and_a_drive_that_brakes_are_refused() {
 #[test]
 fn a_number_of_a_scenario_that_is_not_one_is_refused_by_its_name() {
     type Field = (&'static str, fn(&mut Scenario) -> &mut f64);
-    let fields: [Field; 22] = [
+    let fields: [Field; 23] = [
         ("step", |s| &mut s.step),
         ("cell", |s| &mut s.cell),
+        ("spacing", |s| &mut s.spacing),
         ("steer_max", |s| s.steer_max.insert(0.0)),
         ("steer_levels[0]", |s| &mut s.steer_levels[0]),
         ("sensor_range", |s| &mut s.sensor_range),
@@ -137,4 +141,19 @@ fn a_number_of_a_scenario_that_is_not_one_is_refused_by_its_name() {
         }
     }
     assert!(scenario.check().is_ok());
+}
+
+#[test]
+fn keys_of_a_file_that_exclude_each_other_are_refused_with_what_would_do() {
+    let read = |change: [&str; 2]| {
+        let text = Scenario::text_of("attard2023").unwrap();
+        let changed = text.replacen(change[0], &format!("{}\n\n{}", change[1], change[0]), 1);
+        Scenario::parse("own", &changed, None, &Loading::PLAIN).map(|_| ()).unwrap_err().to_string()
+    };
+    let near = read(["[reward]", "[routes]\nspacing = 5.0\n\n[ending]\nstray_distance = 3.0"]);
+    assert!(near.contains("ending.stray_distance: 3 m; must be at least routes.spacing, 5 m"), "{near}");
+    let coarse = read(["[reward]", "[time]\nstep = 1.0\nsubsteps = 1"]);
+    assert!(coarse.contains("time.substeps: 1; must lie in 2..100: "), "{coarse}");
+    let many = read(["[reward]", "[time]\nstep = 1.0\nsubsteps = 101"]);
+    assert!(many.contains("time.substeps: 101; must lie in 1..100"), "{many}");
 }

@@ -26,6 +26,8 @@ use offtrack_learner::panics;
 
 /// The largest batch that may be asked for.
 const MOST_ENVS: usize = 1 << 22;
+/// Steps of a submission where nobody says it.
+const SUBMISSION: u32 = 8;
 /// A range of sizes goes up by this factor.
 const FACTOR: usize = 4;
 
@@ -44,9 +46,9 @@ pub struct Args {
     /// trucks, and its replay buffer is as small as an update allows.
     #[arg(long)]
     config: Option<PathBuf>,
-    /// With --mode random on a device: steps that are submitted at once.
-    #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=1024))]
-    submission: u32,
+    /// With --mode random on a device: steps that are submitted at once, 8 where nobody says it.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    submission: Option<u32>,
     /// Time for each number of trucks and each mode (s).
     #[arg(long, default_value_t = 5.0)]
     seconds: f64,
@@ -160,6 +162,12 @@ pub fn run(args: &Args) -> Result<(), Error> {
         let expected = "is for --mode training: add that mode, or leave --config out".to_owned();
         return Err(Error::setting("--config", file.display().to_string(), expected));
     }
+    if let Some(submission) =
+        args.submission.filter(|_| args.device.is_processor() || !args.mode.contains(&Mode::Random))
+    {
+        let expected = "is for --mode random on a device: add --device gpu and that mode, or leave it out".to_owned();
+        return Err(Error::setting("--submission", submission.to_string(), expected));
+    }
     outputs::distinct(
         &[("--json", args.json.as_deref()), ("--plot", args.plot.as_deref())],
         &[("--config", args.config.as_deref()), ("--benchmark", Some(Path::new(&args.benchmark)))],
@@ -200,7 +208,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
         routes: world.routes.len(),
         seconds_to_read: drawn.as_secs_f64(),
         seconds_to_bake: baked.as_secs_f64(),
-        submission: args.submission,
+        submission: args.submission.unwrap_or(SUBMISSION),
         runs: Vec::new(),
     };
     files::print(&heading(&scale, &device))?;
@@ -222,7 +230,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
                 world: &world,
                 routes: &routes,
                 envs,
-                submission: args.submission as usize,
+                submission: args.submission.unwrap_or(SUBMISSION) as usize,
                 learner: learner.as_ref(),
             };
             let work = || measured(&mut mode.driven(setting)?, args.seconds);

@@ -12,6 +12,8 @@ fn a_flag_without_effect_is_refused() {
     let said =
         refusal(&offtrack(&["scale", "--envs", "8", "--seconds", "0.1", "--config", &place.text("tiny.toml")]), 2);
     assert!(said.contains("tiny.toml; is for --mode training"), "{said}");
+    let said = refusal(&offtrack(&["scale", "--envs", "8", "--seconds", "0.1", "--submission", "4"]), 2);
+    assert!(said.contains("--submission: 4; is for --mode random on a device"), "{said}");
     for both in
         [&["--list", "--check"][..], &["--junctions", "-o", "a.outline.toml"], &["--check", "-o", "a.outline.toml"]]
     {

@@ -3,13 +3,16 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use offtrack::files::reader::{self, Reader};
+use offtrack::files::reader::{self, Reader, printable, shortened};
 use serde::Deserialize;
 
 use crate::comparison::Asked;
 use crate::error::Error;
 use crate::files;
 use crate::outcomes::{Outcomes, end_of};
+
+/// Most characters of a row's name.
+const LONGEST_NAME: usize = 100;
 
 /// An entry, as its file has it.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -89,6 +92,11 @@ impl Entry {
         let (reader, entry): (Reader, Entry) = Reader::read(file)?;
         if entry.name.trim().is_empty() {
             return Err(reader.invalid("name", "\"\"", "the row's name is needed").into());
+        }
+        if LONGEST_NAME < entry.name.chars().count() || *printable(&entry.name) != *entry.name {
+            let expected =
+                format!("must have at most {LONGEST_NAME} characters that can be seen: it is a table's cell");
+            return Err(reader.invalid("name", format_args!("{:?}", shortened(&entry.name, 40)), expected).into());
         }
         match (&entry.policy, &entry.actions) {
             (None, None) => return Err(reader.invalid("policy", "missing", "`policy` or `actions` is needed").into()),

@@ -104,7 +104,9 @@ pub(crate) fn each<T: Send>(n: usize, search: &(dyn Fn(usize) -> Result<T, Error
                 if n <= index {
                     return Ok(found);
                 }
-                found.push((index, search(index)?));
+                // After a failure nobody needs the others.
+                let one = search(index).inspect_err(|_| next.store(n, Ordering::Relaxed))?;
+                found.push((index, one));
             }
         })
     };

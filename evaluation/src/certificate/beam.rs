@@ -256,7 +256,7 @@ fn note_furthest(world: &World, batch: &Batch, outcome: &mut Outcome) {
         let progress_made = f64::from(progress.waypoint) / f64::from(world.routes[truck.route as usize].n_waypoints);
         if (outcome.progress, outcome.steps) <= (progress_made, truck.steps) {
             (outcome.progress, outcome.steps) = (progress_made, truck.steps);
-            outcome.ended = Ended::from_code(ended).unwrap_or(Ended::Running);
+            outcome.ended = Ended::of_column(ended);
         }
     }
 }

@@ -178,10 +178,8 @@ impl Certificate {
     /// Writes the certificate, a line for each route, whole or not at all.
     pub fn write(&self, file: &Path) -> Result<(), Error> {
         let head = serde_json::to_string(&Certificate { routes: Vec::new(), ..self.clone() });
-        let rows: Result<Vec<String>, _> = self.routes.iter().map(serde_json::to_string).collect();
-        let (head, rows) = head.and_then(|head| Ok((head, rows?))).map_err(|error| Error::write(file)(error.into()))?;
-        // `routes` is the last key, so the head ends with its empty list.
-        let text = format!("{}\n{}\n]}}\n", head.trim_end_matches("]}"), rows.join(",\n"));
+        let lines = head.and_then(|head| files::json_lines(&head, &self.routes));
+        let text = lines.map_err(|error| Error::write(file)(error.into()))? + "\n";
         files::write_whole(file, text.as_bytes())
     }
 

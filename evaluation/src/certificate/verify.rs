@@ -26,9 +26,7 @@ pub struct Sequence {
 pub fn driven(world: &Arc<World>, sequences: &[Sequence]) -> Result<Vec<Ended>, simulator::Error> {
     // A truck drives on after its sequence, so its end code is taken at the sequence's last step.
     let mut ended = vec![Ended::Running; sequences.len()];
-    follow(world, sequences, |index, batch| {
-        ended[index] = Ended::from_code(batch.ended[index]).unwrap_or(Ended::Running)
-    })?;
+    follow(world, sequences, |index, batch| ended[index] = Ended::of_column(batch.ended[index]))?;
     Ok(ended)
 }
 

@@ -2,6 +2,7 @@
 
 use super::{Comparison, Difference, Differing, Estimate, Figure, Figures, GroupDifference, SideFigures};
 use crate::tabular;
+use offtrack::files::reader::printable;
 
 /// Most rows of single routes and roundabouts, and most single episodes, in a text for a person.
 const MOST_ROWS: usize = 20;
@@ -206,7 +207,9 @@ impl Difference {
             Some(cells.into_iter().chain([figure.interval(&estimate)]).collect())
         };
         let caption = format!(
-            "{name} less {to}, in pairs: success, and the rest of the {common} episodes that arrive everywhere"
+            "{} less {}, in pairs: success, and the rest of the {common} episodes that arrive everywhere",
+            printable(name),
+            printable(to)
         );
         Table { caption, rows: std::iter::once(head).chain(Figure::ALL.iter().filter_map(row)).collect() }
     }
@@ -229,7 +232,8 @@ impl Difference {
                 vec![words(kind), group.name.clone(), group.routes.to_string(), first, own, difference, interval]
             }));
         }
-        Table { caption: format!("Success where {} and {} differ", self.name, self.to), rows }
+        let caption = format!("Success where {} and {} differ", printable(&self.name), printable(&self.to));
+        Table { caption, rows }
     }
 
     /// Which episodes arrive on one side alone.

@@ -144,13 +144,9 @@ impl Results {
     ///
     /// A disk that is full, or a folder that may not be written.
     pub fn write(&self, file: &Path) -> Result<(), Error> {
-        let lines = || -> serde_json::Result<String> {
-            let head = serde_json::to_string_pretty(&Results { rows: Vec::new(), ..self.clone() })?;
-            let rows: Vec<String> = self.rows.iter().map(serde_json::to_string).collect::<Result<_, _>>()?;
-            // `rows` is the last key, so the head ends with its empty list.
-            Ok(format!("{}\n{}\n]}}\n", head.trim_end_matches("]\n}"), rows.join(",\n")))
-        };
-        let text = lines().map_err(|error| Error::write(file)(error.into()))?;
+        let head = serde_json::to_string_pretty(&Results { rows: Vec::new(), ..self.clone() });
+        let lines = head.and_then(|head| files::json_lines(&head, &self.rows));
+        let text = lines.map_err(|error| Error::write(file)(error.into()))? + "\n";
         files::write_whole(file, text.as_bytes())
     }
 }

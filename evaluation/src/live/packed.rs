@@ -17,8 +17,8 @@ const ALIGNMENT: usize = 4;
 pub(super) struct Packed {
     kinds: Vec<(&'static str, Vec<u8>)>,
     sections: Vec<Section>,
-    /// Sections by their bytes.
-    known: HashMap<Vec<u8>, usize>,
+    /// Sections by their bytes, and whether these are read as differences.
+    known: HashMap<(bool, Vec<u8>), usize>,
 }
 
 /// Where a section lies in its kind.
@@ -38,7 +38,8 @@ impl Packed {
 
     /// The index of a section with these bytes.
     pub(super) fn add(&mut self, kind: &'static str, bytes: &[u8]) -> usize {
-        if let Some(&known) = self.known.get(bytes) {
+        let key = (kind == DISTANCES, bytes.to_vec());
+        if let Some(&known) = self.known.get(&key) {
             return known;
         }
         let place = self.kinds.iter().position(|(known, _)| *known == kind).unwrap_or_else(|| {
@@ -48,7 +49,7 @@ impl Packed {
         let all = &mut self.kinds[place].1;
         let index = self.sections.len();
         self.sections.push(Section { kind, at: all.len(), size: bytes.len() });
-        self.known.insert(bytes.to_vec(), index);
+        self.known.insert(key, index);
         all.extend(bytes);
         all.resize(all.len().next_multiple_of(ALIGNMENT), 0);
         index
@@ -116,6 +117,8 @@ mod tests {
         let mut packed = Packed::default();
         let added = [("code", "abcde"), ("roads", "xy"), ("code", "f"), ("roads", "abcde")];
         assert_eq!(added.map(|(kind, bytes)| packed.add(kind, bytes.as_bytes())), [0, 1, 2, 0]);
+        let mut apart = Packed::default();
+        assert_eq!([("code", "ab"), (DISTANCES, "ab")].map(|(kind, bytes)| apart.add(kind, bytes.as_bytes())), [0, 1]);
         let places = packed.sections().iter().map(|section| (section.kind, section.at, section.size));
         assert_eq!(places.collect::<Vec<_>>(), [("code", 0, 5), ("roads", 0, 2), ("code", 8, 1)]);
         let (lines, parts) = packed.written().unwrap();

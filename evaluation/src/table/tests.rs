@@ -33,7 +33,7 @@ fn report() -> Report {
     let route = |own_lane_suffices| RouteReport {
         name: "40m/SW-right-1".to_owned(),
         own_lane_suffices,
-        island_radius: 20.0,
+        island_radius: Some(20.0),
         summary: summary.clone(),
     };
     let group = |name: &str| vec![Group { name: name.to_owned(), routes: 2, summary: summary.clone() }];
@@ -164,7 +164,7 @@ fn large_report(one_in: usize) -> Report {
     let route = |index: usize| RouteReport {
         name: format!("wide/7/{index}/SW-right-1"),
         own_lane_suffices: true,
-        island_radius: 20.0,
+        island_radius: Some(20.0),
         summary: fails(index),
     };
     let mut report = report();

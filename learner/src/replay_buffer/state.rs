@@ -42,7 +42,8 @@ impl<const N: usize> ReplayBuffer<N> {
         self.action = stored.exactly("replay buffer, action", n_rows)?;
         if let Some(action) = self.action.iter().find(|&&action| n_actions <= action) {
             return Err(stored.error(format!(
-                "its column `replay buffer, action` has action {action}; the table has 0..{n_actions}"
+                "its column `replay buffer, action` has action {action}; the table has 0..{}",
+                n_actions - 1
             )));
         }
         self.reward = bounded(stored, "replay buffer, reward", n_rows, LARGEST_REWARD)?;

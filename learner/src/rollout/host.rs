@@ -173,7 +173,7 @@ impl<const N: usize> HostRollout<N> {
     /// Counts the episodes that the step just made ended.
     fn count(&mut self) -> Result<(), Error> {
         let batch = self.simulator.batch();
-        let codes = batch.ended.iter().map(|&code| Ended::from_code(code).unwrap_or(Ended::Running));
+        let codes = batch.ended.iter().map(|&code| Ended::of_column(code));
         for (((sum, &reward), ended), &route) in
             self.episode_rewards.iter_mut().zip(&batch.reward).zip(codes).zip(&self.routes)
         {
@@ -263,7 +263,7 @@ impl<const N: usize> Rollout for HostRollout<N> {
             steps.action.extend_from_slice(&actions);
             self.make(&actions)?;
             let batch = self.simulator.batch();
-            let ended = batch.ended.iter().map(|&code| Ended::from_code(code).unwrap_or(Ended::Running));
+            let ended = batch.ended.iter().map(|&code| Ended::of_column(code));
             steps.ended.extend(ended);
             for env in 0..n_envs {
                 let is_late = late_fails && steps.ended[step * n_envs + env].truncated();

@@ -15,6 +15,7 @@ use crate::checkpoint::{Columns, Stored};
 use crate::error::Error;
 use crate::rollout::RouteEnd;
 use offtrack_evaluation::files;
+use offtrack_evaluation::tabular::quoted;
 
 /// Latest episodes of each route that recent success is a fraction of: as many as a number has bits.
 const WINDOW: u32 = u32::BITS;
@@ -39,7 +40,7 @@ struct Counts {
 struct Name {
     route: String,
     roundabout: String,
-    island_radius: f64,
+    island_radius: Option<f64>,
     lane: &'static str,
     exit: u32,
 }
@@ -51,8 +52,8 @@ pub struct RouteCount {
     pub route: String,
     /// The part of it before the last `/`.
     pub roundabout: String,
-    /// Radius of the island (m).
-    pub island_radius: f64,
+    /// Radius of the island (m); `None`, and nothing in the file, on a crossing.
+    pub island_radius: Option<f64>,
     /// `left` or `right`.
     pub lane: &'static str,
     /// Number of the exit.
@@ -107,7 +108,7 @@ impl RouteCounts {
             Name {
                 route: route.name.clone(),
                 roundabout: before.to_owned(),
-                island_radius: roundabout.island_radius(),
+                island_radius: roundabout.has_ring().then(|| roundabout.island_radius()),
                 lane,
                 exit,
             }
@@ -160,10 +161,12 @@ impl RouteCounts {
             } = &row;
             let fraction = |value: f64| if *episodes == 0 { String::new() } else { format!("{value:.4}") };
             let (success, recent) = (fraction(row.success), fraction(row.recent_success));
+            let [route, roundabout] = [route, roundabout].map(|name| quoted(name));
+            let radius = island_radius.map_or(String::new(), |radius| format!("{radius:.2}"));
             // Writing to a string cannot fail.
             let _ = writeln!(
                 text,
-                "{route},{roundabout},{island_radius:.2},{lane},{exit},{episodes},{arrived},{failed},{timed_out},{success},{recent}"
+                "{route},{roundabout},{radius},{lane},{exit},{episodes},{arrived},{failed},{timed_out},{success},{recent}"
             );
         }
         text
@@ -245,6 +248,8 @@ const EPISODES: &str = "routes, episodes";
 
 #[cfg(test)]
 mod tests {
+    use offtrack::files::cache::Loading;
+
     use super::*;
 
     fn counted(file: PathBuf, ends: &[(u32, Ended)]) -> RouteCounts {
@@ -283,6 +288,21 @@ mod tests {
         counts.count(RouteEnd { route: 0, ended: Ended::Arrived });
         counts.write().unwrap();
         assert_eq!(std::fs::read_to_string(&file).unwrap(), counts.text());
+    }
+
+    #[test]
+    fn a_name_with_a_comma_stays_one_cell_and_a_crossing_has_no_island() {
+        let mut scenario = Scenario::named("attard2023").unwrap();
+        scenario.places[0].routes.iter_mut().for_each(|route| route.name = "16m, old/E-left-2".to_owned());
+        let text = RouteCounts::new(&scenario, PathBuf::new()).text();
+        assert!(text.contains("\n\"16m, old/E-left-2\",\"16m, old\",7.85,left,2,0,"), "{text}");
+        let keys = Scenario::text_of("maps2026-crossing").unwrap().replace("test = ", "train = ");
+        let crossing = Scenario::parse("crossing", &keys, None, &Loading::PLAIN).unwrap();
+        let text = RouteCounts::new(&crossing, PathBuf::new()).text();
+        assert!(
+            text.lines().nth(1).unwrap().contains("/town03-crossing,,") || text.contains(",town03-crossing,,"),
+            "{text}"
+        );
     }
 
     #[test]

@@ -151,13 +151,14 @@ pub(super) fn check_world(device: &Device, world: &World) -> Result<(), Error> {
 /// An error if a column of so many trucks is larger than the adapter's largest buffer.
 pub(super) fn check_size(device: &Device, n_envs: usize, has_vehicles: bool) -> Result<(), Error> {
     let limit = largest(device);
-    for &column in Column::ALL {
-        let n_rows = column.n_rows(n_envs, has_vehicles) as u64;
-        let n_bytes = n_rows.saturating_mul(column.width() as u64);
-        if limit < n_bytes {
+    let n_bytes = |column: Column| (column.n_rows(n_envs, has_vehicles) as u64).saturating_mul(column.width() as u64);
+    // By the largest column, the first of them, whose number of trucks fits into all others.
+    let largest = Column::ALL.iter().rev().copied().max_by_key(|&column| n_bytes(column));
+    match largest.map(|column| (column, n_bytes(column))) {
+        Some((column, n_bytes)) if limit < n_bytes => {
             let (adapter, fitting) = (device.adapter.get_info().name, limit / column.width() as u64);
-            return Err(Error::TooManyTrucks { n_envs, buffer: column.name(), n_bytes, adapter, limit, fitting });
+            Err(Error::TooManyTrucks { n_envs, buffer: column.name(), n_bytes, adapter, limit, fitting })
         }
+        _ => Ok(()),
     }
-    Ok(())
 }

@@ -87,7 +87,11 @@ fn corners_apart(reader: &Reader, arms: &[Arm], corners: &[Curve]) -> Result<(),
     let n = corners.len();
     for first in 0..n {
         for second in first..n {
-            if cross(&corners[first], (first != second).then_some(&corners[second]), 0.0) {
+            let overlap = match first == second {
+                true => crosses_itself(&corners[first], 0.0),
+                false => meet(&corners[first], &corners[second]),
+            };
+            if overlap {
                 // Corner i lies between arms i and i + 1: neighbouring corners have the arm between them in common.
                 let (a, b) = if first == second { (first, (first + 1) % n) } else { (first, second) };
                 return Err(reader.invalid(
@@ -121,24 +125,23 @@ fn corners_apart(reader: &Reader, arms: &[Arm], corners: &[Curve]) -> Result<(),
     Ok(())
 }
 
-/// Whether two curves cross or, without a second, whether the first crosses itself other than at its joints, of which a
-/// closed one has one between its last piece and its first where there is slack.
-fn cross(curve: &Curve, other: Option<&Curve>, slack: f64) -> bool {
+/// Whether two curves meet.
+fn meet(curve: &Curve, other: &Curve) -> bool {
+    curve.pieces.iter().any(|piece| other.pieces.iter().any(|there| !piece.meetings(there).is_empty()))
+}
+
+/// Whether a curve crosses itself other than at its joints, of which a closed one has one between its last piece and its
+/// first where there is slack.
+fn crosses_itself(curve: &Curve, slack: f64) -> bool {
     let n = curve.pieces.len();
     let joint = |index: usize, next: usize, p: DVec2| {
         let is_at = |end: DVec2| p.distance(end) < 1e-6;
         let closes = 0.0 < slack && index == 0 && next + 1 == n && is_at(curve.pieces[0].start());
         (index + 1 == next && is_at(curve.pieces[index].end())) || (closes && is_at(curve.pieces[next].end()))
     };
-    (0..n).any(|index| {
-        let piece = &curve.pieces[index];
-        match other {
-            Some(other) => other.pieces.iter().any(|there| !piece.meetings(there).is_empty()),
-            None => {
-                let after = curve.pieces.iter().enumerate().skip(index + 1);
-                after.into_iter().any(|(next, there)| piece.meetings(there).into_iter().any(|p| !joint(index, next, p)))
-            }
-        }
+    curve.pieces.iter().enumerate().any(|(index, piece)| {
+        let mut after = curve.pieces.iter().enumerate().skip(index + 1);
+        after.any(|(next, there)| piece.meetings(there).into_iter().any(|p| !joint(index, next, p)))
     })
 }
 
@@ -152,7 +155,7 @@ fn splitter_apart(
 ) -> Result<(), Error> {
     let key = format!("arm[{arm}].splitter");
     let refused = |value: String, expected: &str| Err(reader.invalid(&key, value, expected));
-    if cross(island, None, slack) {
+    if crosses_itself(island, slack) {
         return refused("crosses itself".into(), "corners must go around the island once");
     }
     let (nearest, edge) = (island.distance(DVec2::ZERO), ring.outer() - ring.gutter);
@@ -160,9 +163,7 @@ fn splitter_apart(
         let value = format!("{} m from the ring's centre", differing(nearest, edge));
         return refused(value, &format!("must stay out of the ring: {} m", shown(edge)));
     }
-    if loops.iter().any(|other| cross(island, Some(other), slack))
-        || !Outline::new(loops.to_vec()).contains(island.point_at(0.0))
-    {
+    if loops.iter().any(|other| meet(island, other)) || !Outline::new(loops.to_vec()).contains(island.point_at(0.0)) {
         return refused("meets a kerb".into(), "must lie on the road, away from the kerbs and other islands");
     }
     Ok(())

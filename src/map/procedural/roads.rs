@@ -1,7 +1,7 @@
 //! Many roads at once, on all cores. A cache keeps which attempts were valid.
 
 use std::collections::BTreeMap;
-use std::sync::atomic::AtomicU64;
+use std::sync::Mutex;
 
 use rayon::prelude::*;
 
@@ -32,7 +32,7 @@ impl Distribution {
                 *known = cache.get(KIND, &self.key(seed, chunk)).map(|bytes| parsed(&bytes)).unwrap_or_default();
             }
         }
-        let done = AtomicU64::new(0);
+        let done = Mutex::new(0);
         let road = |&index: &u32| {
             loading.check()?;
             let road = match chunks.get(&(index / CHUNK)).and_then(|known| known.get(&index)) {
