@@ -362,8 +362,8 @@ class Batch(_offtrack.Batch):
         """Copies of columns, all where none is named: arrays of ``num_envs`` rows, see :data:`COLUMNS`, of those of
         vehicles without rows where there are none.
 
-        ``batch.columns("truck")["truck"]["speed"]`` is every truck's speed [m/s]. From a graphics device only the named
-        ones are read.
+        ``batch.columns("truck")["truck"]["speed"]`` is every truck's speed [m/s]; ``clearance`` is that of the last
+        step, of the episode before where one has begun. From a graphics device only the named ones are read.
         """
         wanted = [text("column", name) for name in names] or list(COLUMNS)
         rows = self.column_bytes(wanted)

@@ -21,7 +21,7 @@ macro_rules! columns {
             Control control: Control,
             /// The trucks
             Truck truck: Truck,
-            /// Distances to the kerbs in the last step; 0 before the first (m)
+            /// Distances to the kerbs (m)
             Clearance clearance: Clearance,
             /// Progress along the routes
             Progress progress: Progress,

@@ -34,7 +34,7 @@ fn driven(world: &Arc<World>, engine: &offtrack::simulator::Engine) -> Simulator
 fn a_state_with_any_number_replaced_is_refused_or_gives_finite_observations_and_rewards() {
     let floats =
         [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e38, -1e38, f32::MAX, 1e7, 2000.0, -300.0, 5.0, -1.0, 0.5, 1e-38];
-    let words = floats.into_iter().map(f32::to_bits).chain([0, 1, 23, 1000, u32::MAX / 2, u32::MAX - 1]);
+    let words = floats.into_iter().map(f32::to_bits).chain([0, 1, 23, 1000, u32::MAX - 1]);
     let words: Vec<u32> = words.collect();
     for name in ["attard2023", "laden2026"] {
         let world = Arc::new(benchmark(name).1);

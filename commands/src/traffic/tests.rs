@@ -55,6 +55,8 @@ fn a_lane_to_which_more_come_than_it_serves_is_at_level_f_and_one_to_which_nobod
     let served = of("N").iter().map(|entry| entry["served"].as_f64().unwrap()).sum::<f64>();
     assert!(served < 1600.0 && of("N").iter().any(|entry| entry["level"] == "F"), "{:?}", of("N"));
     assert!(of("W").iter().all(|entry| entry["level"] != "F"), "{:?}", of("W"));
+    // Who stays away is in no delay, so these alone would flatter.
+    assert!(0.03 < full[0]["stayed"].as_f64().unwrap() && full[0]["level"] == "F", "{}", full[0]["stayed"]);
     for entry in of("S") {
         assert!(entry["delay"].is_null() && entry["level"].is_null() && entry["served"] == 0.0, "{entry}");
     }

@@ -93,6 +93,16 @@ pub(super) fn drawn(file: &Path, drawing: Drawing, layers: &Layers) -> Result<Dr
     }
     let arms = arms(&reader, &ways, layers, mirrored)?;
     let mut lines = lines(&reader, &lanes, &ways, &arms, (radius, outer), layers.lane_width)?;
+    for (index, arm) in arms.iter().enumerate() {
+        let missing = if lines.iter().all(|line| line.entry != index) {
+            "begins"
+        } else if lines.iter().all(|line| line.exit_arm != index) {
+            "ends"
+        } else {
+            continue;
+        };
+        notes.push(format!("no way {missing} on arm {}: ends more than 20 deg apart are of two arms", arm.name));
+    }
     lines.sort_by_key(|line| (line.entry, line.lane == Lane::Right, line.exit));
     let mut lane_radii: Vec<f64> =
         lines.iter().map(|line| ring_radius(&line.line.polyline(0.01), radius, outer)).collect();

@@ -353,6 +353,16 @@ fn a_way_leads_from_an_arm_through_the_ring_to_an_arm_and_one_over_a_kerb_is_not
     let dot = "0\nLINE\n8\nKERB\n10\n3030\n20\n-500\n11\n3030.01\n21\n-500\n";
     let notes = read(&(whole.clone() + dot), &layers()).unwrap().notes;
     assert_eq!(notes, ["1 lines on layer KERB that are shorter than 0.02 m are left out"]);
+    // Without the ways that leave at an arm that one only enters.
+    let ground = road.ground();
+    let kerbs = ground.faces.loops.iter().map(|curve| polyline("KERB", curve, true, 1.0));
+    let stay =
+        ground.lines.iter().filter(|line| line.exit_arm != 0).map(|line| polyline("LANE", &line.line, false, 1.0));
+    let notes = read(&kerbs.chain(stay).collect::<String>(), &layers()).unwrap().notes;
+    assert_eq!(
+        notes,
+        [format!("no way ends on arm {}: ends more than 20 deg apart are of two arms", ground.arms[0].name)]
+    );
     let across: String = road
         .ground()
         .faces
