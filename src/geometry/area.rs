@@ -21,6 +21,10 @@ const GRID: f64 = 16384.0;
 
 /// Loops and spikes smaller than this are none (m, m²).
 const LOOP: f64 = 1e-3;
+/// Units of a metre that points are rounded to where they are written (1/m).
+const ROUNDED: f64 = 1e4;
+/// Most times that a contour is mended.
+const MOST_TIMES: usize = 4;
 
 /// Contours of one connected part: its outer one, then its holes.
 type Part = Vec<Vec<[f64; 2]>>;
@@ -68,11 +72,30 @@ pub(crate) fn signed_area(contour: &[[f64; 2]]) -> f64 {
     (0..n).map(|i| DVec2::from(contour[i]).perp_dot(contour[(i + 1) % n].into())).sum::<f64>() / 2.0
 }
 
-/// The contour of a curve that crosses itself in loops too small to see, without them; any other one as it is.
+/// The contour of a curve that crosses itself in loops too small to see, without them; any other one as it is. So it is
+/// where its points are rounded, too.
 pub(crate) fn uncrossed(contour: Vec<DVec2>) -> Vec<DVec2> {
-    if !crosses_itself(&contour) {
+    let rounded = |contour: Vec<DVec2>| -> Vec<DVec2> {
+        let mut points: Vec<DVec2> = contour.into_iter().map(|p| (p * ROUNDED).round() / ROUNDED).collect();
+        points.dedup();
+        points
+    };
+    let mut kept = rounded(contour.clone());
+    if !crosses_itself(&kept) {
         return contour;
     }
+    // What rounding crosses again is less each time.
+    for _ in 0..MOST_TIMES {
+        kept = rounded(without_loops(kept));
+        if !crosses_itself(&kept) {
+            break;
+        }
+    }
+    kept
+}
+
+/// The largest part of a contour's inside, turned as the contour is.
+fn without_loops(contour: Vec<DVec2>) -> Vec<DVec2> {
     let turned = |contour: &[[f64; 2]]| 0.0 < signed_area(contour);
     let before: Vec<[f64; 2]> = contour.iter().map(|&p| p.into()).collect();
     let tidy = Area::union(std::iter::once(counter_clockwise(contour))).tidied(LOOP, LOOP);

@@ -54,7 +54,7 @@ fn a_checkpoint_with_a_right_checksum_and_wrong_contents_is_refused_by_its_colum
         ("actor, layer 1, weight", &f32::NAN.to_le_bytes(), "`actor, layer 1, weight` has NaN at 0"),
         ("entropy coefficient", &f32::INFINITY.to_le_bytes(), "`entropy coefficient` has inf at 0"),
         ("normalisation, mean", &f32::NAN.to_le_bytes(), "`normalisation, mean` has NaN"),
-        ("replay buffer, action", &77u32.to_le_bytes(), "`replay buffer, action` has action 77; the table has 0..5"),
+        ("replay buffer, action", &77u32.to_le_bytes(), "`replay buffer, action` has action 77; the table has 0..4"),
         ("replay buffer, reward", &f32::NAN.to_le_bytes(), "`replay buffer, reward` has NaN"),
         ("replay buffer, reward", &1e38f32.to_le_bytes(), "`replay buffer, reward` has 1e38, which no run makes"),
         (
