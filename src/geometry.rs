@@ -17,6 +17,7 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec2;
 
 pub use alignment::{Bend, Misfit, rounded, to_circle};
+pub use area::ROUNDED;
 pub(crate) use fit::arc_of_height;
 pub use fit::{bulging_outline, fitted_line, fitted_outline};
 pub use outline::{Nearby, Outline};
@@ -250,8 +251,8 @@ impl Curve {
         points
     }
 
-    /// The points of a closed curve as a polygon, each once. Where the curve crosses itself in a loop of less than a few
-    /// millimetres, as one that was fitted to a map may, the polygon does not.
+    /// The points of a closed curve as a polygon, each once. Where the curve crosses itself in a loop of less than a
+    /// few millimetres, as one that was fitted to a map may, the polygon does not.
     pub fn polygon(&self, tolerance: f64) -> Vec<DVec2> {
         let mut points = self.polyline(tolerance);
         points.pop();

@@ -223,8 +223,7 @@ impl Observer {
         let Some(asked) = self.world.actions.get(action as usize) else {
             return Err(Error::UnknownAction { env: 0, action, limit: self.world.params.n_actions });
         };
-        checked::target(target_speed)?;
-        Ok(self.targeted(asked, target_speed))
+        self.targeted(asked, target_speed)
     }
 
     /// What a command asks for, where actions are continuous; as [`Observer::command`].
@@ -237,16 +236,16 @@ impl Observer {
             return Err(Error::NeedsIndices);
         }
         check_command(0, command)?;
-        checked::target(target_speed)?;
         let asked = commanded(&self.world.actions[0], &self.world.actions[1], command);
-        Ok(self.targeted(&asked, target_speed))
+        self.targeted(&asked, target_speed)
     }
 
     /// What is asked for on the map where the last target speed was `target_speed` (m/s).
-    fn targeted(&self, asked: &Action, target_speed: f32) -> Action {
+    fn targeted(&self, asked: &Action, target_speed: f32) -> Result<Action, Error> {
+        checked::target(target_speed)?;
         let before = Control { target_speed, ..Control::default() };
         let Action { steering, speed } = targeted(&self.world.params, asked, &before);
-        Action { steering: self.on_map(steering), speed }
+        Ok(Action { steering: self.on_map(steering), speed })
     }
 
     /// The acceleration by which the simulator's speed control approaches a target from the present speed, both m/s, in

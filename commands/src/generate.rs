@@ -45,8 +45,8 @@ pub struct Args {
     /// lie.
     #[arg(long)]
     plot: Option<PathBuf>,
-    /// Write each road as an OpenDRIVE map, too, wide-7-12.xodr, but for the few that lose routes or kerbs so, which are
-    /// named.
+    /// Write each road as an OpenDRIVE map, too, wide-7-12.xodr, but for the few that lose routes or kerbs so: these
+    /// are named.
     #[arg(long, requires = "output")]
     xodr: bool,
     /// Write over files of these names that the folder has already and that hold something else.

@@ -1,7 +1,7 @@
 //! Curves as points: kerbs as polygons, and lines.
 
 use glam::DVec2;
-use offtrack::geometry::{Curve, Outline};
+use offtrack::geometry::{Curve, Outline, ROUNDED};
 
 /// Largest distance of a chord to its arc, half of the documented 1 cm (m).
 const TOLERANCE: f64 = 0.005;
@@ -30,7 +30,7 @@ pub fn corners(kerbs: &Outline) -> (Vec<Vec<DVec2>>, Vec<Vec<DVec2>>) {
 
 /// The polygon of `points`, rounded to a tenth of a millimetre.
 pub fn rounded(points: &[DVec2]) -> Polygon {
-    points.iter().map(|p| [to(1e4, p.x), to(1e4, p.y)]).collect()
+    points.iter().map(|p| [to(ROUNDED, p.x), to(ROUNDED, p.y)]).collect()
 }
 
 /// A number rounded to so many parts of 1.

@@ -76,7 +76,7 @@ pub(crate) fn html_text(text: &str) -> String {
 }
 
 /// The same as CSV (RFC 4180).
-pub fn csv(rows: &[Vec<String>]) -> String {
+pub(crate) fn csv(rows: &[Vec<String>]) -> String {
     let line = |row: &Vec<String>| row.iter().map(|cell| quoted(cell)).collect::<Vec<_>>().join(",") + "\n";
     rows.iter().map(line).collect()
 }

@@ -21,8 +21,8 @@ const GRID: f64 = 16384.0;
 
 /// Loops and spikes smaller than this are none (m, m²).
 const LOOP: f64 = 1e-3;
-/// Units of a metre that points are rounded to where they are written (1/m).
-const ROUNDED: f64 = 1e4;
+/// Parts of a metre that points are rounded to where they are written (1/m).
+pub const ROUNDED: f64 = 1e4;
 /// Most times that a contour is mended.
 const MOST_TIMES: usize = 4;
 
@@ -96,13 +96,15 @@ pub(crate) fn uncrossed(contour: Vec<DVec2>) -> Vec<DVec2> {
 
 /// The largest part of a contour's inside, turned as the contour is.
 fn without_loops(contour: Vec<DVec2>) -> Vec<DVec2> {
-    let turned = |contour: &[[f64; 2]]| 0.0 < signed_area(contour);
-    let before: Vec<[f64; 2]> = contour.iter().map(|&p| p.into()).collect();
-    let tidy = Area::union(std::iter::once(counter_clockwise(contour))).tidied(LOOP, LOOP);
+    let turned = counter_clockwise(contour.clone());
+    let is_clockwise = turned != contour;
+    let tidy = Area::union(std::iter::once(turned)).tidied(LOOP, LOOP);
     let outer = tidy.parts.iter().filter_map(|part| part.first());
-    let largest = outer.max_by(|one, other| signed_area(one).abs().total_cmp(&signed_area(other).abs()));
-    let mut kept = largest.map_or_else(|| points(&before), |largest| points(largest));
-    if largest.is_some_and(|largest| turned(largest) != turned(&before)) {
+    let Some(largest) = outer.max_by(|one, other| signed_area(one).total_cmp(&signed_area(other))) else {
+        return contour;
+    };
+    let mut kept = points(largest);
+    if is_clockwise {
         kept.reverse();
     }
     kept

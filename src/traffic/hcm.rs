@@ -69,8 +69,8 @@ pub fn level_of_lane(delay: f64, is_over_capacity: bool) -> char {
     if is_over_capacity { 'F' } else { level_of_service(delay) }
 }
 
-/// Level of service of a whole roundabout, by control delay alone: A to F (s).
-pub fn level_of_service(delay: f64) -> char {
+/// Level of service by control delay alone: A to F (s).
+fn level_of_service(delay: f64) -> char {
     match delay {
         ..=10.0 => 'A',
         ..=15.0 => 'B',

@@ -168,6 +168,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
         let expected = "is for --mode random on a device: add --device gpu and that mode, or leave it out".to_owned();
         return Err(Error::setting("--submission", submission.to_string(), expected));
     }
+    let submission = args.submission.unwrap_or(SUBMISSION);
     outputs::distinct(
         &[("--json", args.json.as_deref()), ("--plot", args.plot.as_deref())],
         &[("--config", args.config.as_deref()), ("--benchmark", Some(Path::new(&args.benchmark)))],
@@ -208,7 +209,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
         routes: world.routes.len(),
         seconds_to_read: drawn.as_secs_f64(),
         seconds_to_bake: baked.as_secs_f64(),
-        submission: args.submission.unwrap_or(SUBMISSION),
+        submission,
         runs: Vec::new(),
     };
     files::print(&heading(&scale, &device))?;
@@ -230,7 +231,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
                 world: &world,
                 routes: &routes,
                 envs,
-                submission: args.submission.unwrap_or(SUBMISSION) as usize,
+                submission: submission as usize,
                 learner: learner.as_ref(),
             };
             let work = || measured(&mut mode.driven(setting)?, args.seconds);

@@ -1,7 +1,8 @@
 //! Swept paths as DXF, to be put back into the drawing that a road is from: in metres, in the frame of its map.
 //!
 //! Release 12 in ASCII, which every CAD program reads: its names of layers have up to 31 capital letters, digits and
-//! `-_$`. Of what that release does not have the unit alone is written: older programs skip it, and a comment says it too.
+//! `-_$`. Of what that release does not have the unit alone is written: older programs skip it, and a comment says it
+//! too.
 
 use std::fmt::Write;
 

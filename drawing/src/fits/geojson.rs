@@ -4,7 +4,7 @@
 //! drawn in metres: their frame is named by the member `crs` of the GeoJSON before it, where it is known.
 
 use glam::DVec2;
-use offtrack::geometry::Curve;
+use offtrack::geometry::{Curve, ROUNDED};
 use offtrack::map::ground::Kerb;
 use offtrack::map::{Gutter, Road};
 use offtrack::vehicle::swept::{Pose, front_path};
@@ -16,8 +16,6 @@ use super::stations;
 
 /// Largest distance of a chord from its arc (m).
 const CHORD: f64 = 5e-4;
-/// Parts of a metre that coordinates are rounded to.
-const ROUNDED: f64 = 1e4;
 /// Points of a line nearer than this to the one before are left out (m).
 const SAME: f64 = 2e-3;
 

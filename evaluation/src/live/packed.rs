@@ -17,8 +17,8 @@ const ALIGNMENT: usize = 4;
 pub(super) struct Packed {
     kinds: Vec<(&'static str, Vec<u8>)>,
     sections: Vec<Section>,
-    /// Sections by their bytes, and whether these are read as differences.
-    known: HashMap<(bool, Vec<u8>), usize>,
+    /// Sections by their bytes.
+    known: HashMap<Vec<u8>, usize>,
 }
 
 /// Where a section lies in its kind.
@@ -38,8 +38,9 @@ impl Packed {
 
     /// The index of a section with these bytes.
     pub(super) fn add(&mut self, kind: &'static str, bytes: &[u8]) -> usize {
-        let key = (kind == DISTANCES, bytes.to_vec());
-        if let Some(&known) = self.known.get(&key) {
+        // Scripts read distances alone as differences.
+        let is_alike = |&&known: &&usize| (self.sections[known].kind == DISTANCES) == (kind == DISTANCES);
+        if let Some(&known) = self.known.get(bytes).filter(is_alike) {
             return known;
         }
         let place = self.kinds.iter().position(|(known, _)| *known == kind).unwrap_or_else(|| {
@@ -49,7 +50,7 @@ impl Packed {
         let all = &mut self.kinds[place].1;
         let index = self.sections.len();
         self.sections.push(Section { kind, at: all.len(), size: bytes.len() });
-        self.known.insert(key, index);
+        self.known.insert(bytes.to_vec(), index);
         all.extend(bytes);
         all.resize(all.len().next_multiple_of(ALIGNMENT), 0);
         index

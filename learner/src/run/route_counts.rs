@@ -166,7 +166,8 @@ impl RouteCounts {
             // Writing to a string cannot fail.
             let _ = writeln!(
                 text,
-                "{route},{roundabout},{radius},{lane},{exit},{episodes},{arrived},{failed},{timed_out},{success},{recent}"
+                "{route},{roundabout},{radius},{lane},{exit},\
+                 {episodes},{arrived},{failed},{timed_out},{success},{recent}"
             );
         }
         text
@@ -299,10 +300,7 @@ mod tests {
         let keys = Scenario::text_of("maps2026-crossing").unwrap().replace("test = ", "train = ");
         let crossing = Scenario::parse("crossing", &keys, None, &Loading::PLAIN).unwrap();
         let text = RouteCounts::new(&crossing, PathBuf::new()).text();
-        assert!(
-            text.lines().nth(1).unwrap().contains("/town03-crossing,,") || text.contains(",town03-crossing,,"),
-            "{text}"
-        );
+        assert!(text.contains(",town03-crossing,,"), "{text}");
     }
 
     #[test]

@@ -11,6 +11,7 @@ use super::ring::Ring;
 use super::roundabout_keys::Arm;
 use crate::files::reader::{Error, Reader, differing, shown};
 use crate::geometry::{Curve, Outline, Piece, rounded, wrapped};
+use crate::map::apron::crosses;
 use crate::map::ground::Kerb;
 
 /// The kerbs in the order of the loops that [`kerbs`] makes.
@@ -89,7 +90,7 @@ fn corners_apart(reader: &Reader, arms: &[Arm], corners: &[Curve]) -> Result<(),
         for second in first..n {
             let overlap = match first == second {
                 true => crosses_itself(&corners[first], 0.0),
-                false => meet(&corners[first], &corners[second]),
+                false => crosses(&corners[first], &corners[second]),
             };
             if overlap {
                 // Corner i lies between arms i and i + 1: neighbouring corners have the arm between them in common.
@@ -125,13 +126,8 @@ fn corners_apart(reader: &Reader, arms: &[Arm], corners: &[Curve]) -> Result<(),
     Ok(())
 }
 
-/// Whether two curves meet.
-fn meet(curve: &Curve, other: &Curve) -> bool {
-    curve.pieces.iter().any(|piece| other.pieces.iter().any(|there| !piece.meetings(there).is_empty()))
-}
-
-/// Whether a curve crosses itself other than at its joints, of which a closed one has one between its last piece and its
-/// first where there is slack.
+/// Whether a curve crosses itself other than at its joints, of which a closed one has one between its last piece and
+/// its first where there is slack.
 fn crosses_itself(curve: &Curve, slack: f64) -> bool {
     let n = curve.pieces.len();
     let joint = |index: usize, next: usize, p: DVec2| {
@@ -163,7 +159,8 @@ fn splitter_apart(
         let value = format!("{} m from the ring's centre", differing(nearest, edge));
         return refused(value, &format!("must stay out of the ring: {} m", shown(edge)));
     }
-    if loops.iter().any(|other| meet(island, other)) || !Outline::new(loops.to_vec()).contains(island.point_at(0.0)) {
+    if loops.iter().any(|other| crosses(island, other)) || !Outline::new(loops.to_vec()).contains(island.point_at(0.0))
+    {
         return refused("meets a kerb".into(), "must lie on the road, away from the kerbs and other islands");
     }
     Ok(())

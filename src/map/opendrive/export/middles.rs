@@ -1,5 +1,5 @@
-//! What is paved between the carriageways of an arm, between lanes of one and beside its kerb, as a lane for none: beside
-//! the entry lane that is nearest to an exit lane, up to that one, and from each lane to the next or to the kerb.
+//! What is paved between the carriageways of an arm, between lanes of one and beside its kerb, as a lane for none:
+//! beside the entry lane that is nearest to an exit lane, up to that one, and from each lane to the next or the kerb.
 
 use glam::DVec2;
 
@@ -138,8 +138,8 @@ fn stations(line: &Curve) -> impl Iterator<Item = f64> + use<> {
     (0..=n as usize).map(move |i| length * i as f64 / n)
 }
 
-/// Distance from a point of a line straight across to the nearest other line, to the left or the right; 0 if none is met
-/// (m).
+/// Distance from a point of a line straight across to the nearest other line, to the left or the right; 0 if none is
+/// met (m).
 fn across(line: &Curve, s: f64, side: f64, others: &[&Curve]) -> f64 {
     let p = line.point_at(s);
     let out = side * DVec2::from_angle(line.heading_at(s)).perp();
