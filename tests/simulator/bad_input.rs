@@ -26,7 +26,8 @@ const LIKE_OTHERS: &str = "
     attard2023-maps-full 16m 16m-maps 20m-maps 32m 32m-maps 40m 40m-maps 50m traffic2026 traffic2026-aggressive
     traffic2026-distracted traffic2026-laden traffic2026-maps traffic2026-random traffic2026-refinement
     traffic2026-rude traffic2026-timid traffic2026-training transfer2026-30kmh transfer2026-50kmh transfer2026-8kmh
-    transfer2026-attard2023 transfer2026-held-out transfer2026-random transfer2026-refinement transfer2026-training
+    transfer2026-attard2023 transfer2026-held-out transfer2026-no-slip transfer2026-no-slip-random transfer2026-random
+    transfer2026-refinement transfer2026-refinement-any-slip transfer2026-training
     cn_18m1 eu_4x2_13m6 eu_4x2_13m6_steered eu_6x4_13m6 uk_15m5 uk_16m5 us_wb40 us_wb67 wide
 ";
 

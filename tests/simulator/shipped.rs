@@ -32,12 +32,12 @@ fn every_scenario_file_of_the_repository_is_embedded_as_it_is() {
         FILES.iter().map(|&(path, text)| (path.to_owned(), text.to_owned())).collect();
     assert_eq!(
         (files.len(), FILES.len()),
-        (74, 74),
-        "47 benchmarks, ten roundabouts, five outlines, ten vehicles, two distributions"
+        (77, 77),
+        "50 benchmarks, ten roundabouts, five outlines, ten vehicles, two distributions"
     );
     assert!(files == embedded, "on disk {:?}, embedded {:?}", files.keys(), embedded.keys());
     let kinds = [Kind::Benchmark, Kind::Roundabout, Kind::Vehicle, Kind::Distribution];
-    assert_eq!(kinds.map(|kind| kind.names().count()), [47, 10, 10, 2]);
+    assert_eq!(kinds.map(|kind| kind.names().count()), [50, 10, 10, 2]);
 }
 
 /// A shipped benchmark's file as it is read as TOML.
@@ -212,6 +212,13 @@ fn the_benchmarks_of_transfer2026_differ_in_roads_training_and_disturbances_alon
     assert_eq!(random.remove("procedural"), table("laden2026-random").remove("procedural"));
     expected.remove("roundabout");
     assert_eq!(random, expected);
+    // Without slip all else is the same.
+    for name in ["transfer2026", "transfer2026-random"] {
+        let mut without = table(&name.replace("transfer2026", "transfer2026-no-slip"));
+        let slip =
+            without["draw"].as_table_mut().unwrap().insert("slip".to_owned(), table(name)["draw"]["slip"].clone());
+        assert_eq!((without, slip), (table(name), Some(vec![0.0, 0.0].into())), "{name}");
+    }
     // A refinement has other roads, one more vehicle, and lags and slip down to less; its seed is no other benchmark's.
     let (mut refinement, mut training) = (table("transfer2026-refinement"), table("transfer2026-training"));
     assert_ne!(refinement["procedural"]["seed"], training["procedural"]["seed"]);
@@ -222,7 +229,13 @@ fn the_benchmarks_of_transfer2026_differ_in_roads_training_and_disturbances_alon
         let [least, trained] = [&refinement, &training].map(|table| table["draw"][key][0].as_float().unwrap());
         assert!(least < trained, "{key}");
     }
-    // One more has the truck of attard2023 beside, which is not drawn.
+    // One more has the truck of attard2023 beside, which is not drawn, and another trucks without slip, too.
+    let mut any_slip = table("transfer2026-refinement-any-slip");
+    let kinematic = any_slip["vehicle"].as_array_mut().unwrap().pop().unwrap();
+    assert_eq!(kinematic["model"]["slip_lever"].as_float(), Some(0.0));
+    let slip = any_slip["draw"].as_table_mut().unwrap().insert("slip".to_owned(), refinement["draw"]["slip"].clone());
+    assert_eq!(slip.unwrap()[0].as_float(), Some(0.0));
+    assert_eq!(any_slip, table("transfer2026-refinement-home"));
     let (mut at_home, attard) = (table("transfer2026-refinement-home"), table("transfer2026-attard2023"));
     let own = at_home["vehicle"].as_array_mut().unwrap().pop().unwrap();
     assert_eq!((own["drawn"].as_bool(), own.get("model")), (Some(false), None));
@@ -296,7 +309,7 @@ fn the_continuous_benchmarks_differ_from_those_with_levels_in_their_actions_alon
 fn every_name_gives_what_its_file_gives() {
     // The largest take minutes; the test of the large benchmarks reads them as text.
     let benchmarks: Vec<&str> = Kind::Benchmark.names().filter(|name| !LARGE.contains(name)).collect();
-    assert_eq!(benchmarks.len(), 45);
+    assert_eq!(benchmarks.len(), 48);
     for name in benchmarks {
         let named = Scenario::named(name).unwrap();
         let read = Scenario::read(&scenarios().join(name).with_extension("toml")).unwrap();

@@ -94,6 +94,7 @@ mod tests {
             ("transfer2026-training", &["transfer2026", "transfer2026-random", "transfer2026-held-out"]),
             ("transfer2026-refinement", &["transfer2026", "transfer2026-random"]),
             ("transfer2026-refinement-home", &["transfer2026", "transfer2026-random"]),
+            ("transfer2026-refinement-any-slip", &["transfer2026", "transfer2026-random", "transfer2026-no-slip"]),
             ("laden2026-50-training", &["laden2026-50", "laden2026-50-random"]),
             ("traffic2026-training", &["traffic2026", "traffic2026-random"]),
             (
