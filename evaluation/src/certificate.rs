@@ -6,6 +6,7 @@ pub mod avoidance; // a search from before a contact with another vehicle
 pub mod beam; // a search
 pub mod file; // what it found
 pub mod line; // the paths that it drove, as lines to follow
+mod pending; // what a truck that answers late was asked for
 pub mod verify; // driving it again
 
 use std::collections::HashSet;

@@ -100,7 +100,7 @@ impl Again<'_> {
                     return Ok((Some(children.swap_remove(env).actions), env_steps));
                 }
             }
-            let survivors = selected(copies.batch(), &children, pass.width);
+            let survivors = selected(self.world, copies.batch(), &children, pass.width);
             if survivors.is_empty() {
                 return Ok((None, env_steps));
             }

@@ -8,12 +8,13 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 use offtrack::layout::angle::wrapped;
-use offtrack::layout::{Ended, Params, Rig, Start, Truck};
+use offtrack::layout::{Ended, Params, Rig, Start};
 use offtrack::simulator::{Batch, RouteChoice, Simulator};
 use offtrack::world::World;
 use offtrack_policy::{Driver, Policy, greedy};
 
 use super::check_levels;
+use super::pending::{Cell, Pending};
 use crate::error::Error;
 
 /// Discount of a candidate's cost with each step: what lies long ago says little about what follows.
@@ -36,7 +37,7 @@ const SLOWNESS_WEIGHT: f32 = 0.25;
 /// angle (rad).
 const POSITION_BIN: f32 = 0.2;
 const HEADING_BIN: f32 = 0.035;
-const STEER_BIN: f32 = 0.07;
+pub(super) const STEER_BIN: f32 = 0.07;
 /// Speed, where it is chosen (m/s).
 const SPEED_BIN: f32 = 1.0;
 /// Steer angles that differ by less are equal (rad).
@@ -133,7 +134,7 @@ pub fn search(
             }
         }
         note_furthest(world, simulator.batch(), &mut outcome);
-        let survivors = selected(simulator.batch(), &children, pass.width);
+        let survivors = selected(world, simulator.batch(), &children, pass.width);
         if survivors.is_empty() {
             break;
         }
@@ -169,13 +170,9 @@ pub(super) fn branched(
             rows.push(row as u32);
             children.push(candidate.clone());
         }
-        for action in distinct(
-            world,
-            world.rig(&batch.truck[row]),
-            batch.truck[row].steering,
-            candidate.held.unwrap_or(straight),
-            hold,
-        ) {
+        let rig = world.rig(&batch.truck[row]);
+        let steering = Pending::new(world, rig, &batch.control[row]).followed(batch.truck[row].steering);
+        for action in distinct(world, rig, steering, candidate.held.unwrap_or(straight), hold) {
             rows.push(row as u32);
             children.push(Candidate { held: Some(action), ..candidate.clone() });
         }
@@ -184,7 +181,8 @@ pub(super) fn branched(
 }
 
 /// The actions that differ within `hold` steps: the steer angle changes at a limited rate, so all levels beyond reach
-/// are equal. The `last` action represents those equal to it, so that a sequence changes seldom.
+/// are equal. The `last` action represents those equal to it, so that a sequence changes seldom. `steering` is the steer
+/// angle once all that was asked for before has taken effect (rad).
 fn distinct(world: &World, rig: &Rig, steering: f32, last: u32, hold: usize) -> Vec<u32> {
     let params = &world.params;
     let reach = rig.steer_rate * (hold as u32 * params.n_substeps) as f32 * params.substep;
@@ -262,19 +260,21 @@ fn note_furthest(world: &World, batch: &Batch, outcome: &mut Outcome) {
 }
 
 /// The rows to keep: the policy's own while it runs, then the cheapest; of nearly equal states only the cheapest.
-pub(super) fn selected(batch: &Batch, children: &[Candidate], width: usize) -> Vec<u32> {
+pub(super) fn selected(world: &World, batch: &Batch, children: &[Candidate], width: usize) -> Vec<u32> {
     let mut running: Vec<u32> = (0..children.len() as u32).filter(|&row| batch.truck[row as usize].held == 0).collect();
     let rank = |row: u32| (children[row as usize].held.is_some(), children[row as usize].cost);
     running.sort_by(|&a, &b| rank(a).0.cmp(&rank(b).0).then(rank(a).1.total_cmp(&rank(b).1)));
     let mut taken = HashSet::new();
-    running.retain(|&row| taken.len() < width && taken.insert(bin(&batch.truck[row as usize])));
+    running.retain(|&row| taken.len() < width && taken.insert(bin(world, batch, row as usize)));
     running
 }
 
 /// The cell of the state space that a truck is in: nearly equal states share one.
-fn bin(truck: &Truck) -> [i32; 6] {
+fn bin(world: &World, batch: &Batch, row: usize) -> ([i32; 6], Cell) {
+    let truck = &batch.truck[row];
+    let pending = Pending::new(world, world.rig(truck), &batch.control[row]).cell();
     let articulation = wrapped(truck.heading - truck.trailer_heading);
-    [
+    let cell = [
         truck.position.x / POSITION_BIN,
         truck.position.y / POSITION_BIN,
         truck.heading / HEADING_BIN,
@@ -282,7 +282,8 @@ fn bin(truck: &Truck) -> [i32; 6] {
         truck.steering / STEER_BIN,
         truck.speed / SPEED_BIN,
     ]
-    .map(|value| value.round() as i32)
+    .map(|value| value.round() as i32);
+    (cell, pending)
 }
 
 #[cfg(test)]
@@ -316,7 +317,7 @@ mod tests {
     #[test]
     fn a_beam_keeps_at_most_its_width_and_one_candidate_a_state() {
         let world = world();
-        let mut simulator = Simulator::new(world, 6, 0, RouteChoice::Fixed(vec![0, 0, 0, 20, 20, 40])).unwrap();
+        let mut simulator = Simulator::new(world.clone(), 6, 0, RouteChoice::Fixed(vec![0, 0, 0, 20, 20, 40])).unwrap();
         simulator.reset_from(&[Start::default(); 6]).unwrap();
         let child = |held, cost| Candidate { parent: ROOT, actions: Vec::new(), held, cost };
         let children = [
@@ -328,8 +329,8 @@ mod tests {
             child(Some(4), 0.2),
         ];
         // The policy's own first, whatever its cost; then the cheapest of each state.
-        assert_eq!(selected(simulator.batch(), &children, 64), [2, 5, 4]);
-        assert_eq!(selected(simulator.batch(), &children, 2), [2, 5]);
+        assert_eq!(selected(&world, simulator.batch(), &children, 64), [2, 5, 4]);
+        assert_eq!(selected(&world, simulator.batch(), &children, 2), [2, 5]);
     }
 
     #[test]
