@@ -250,7 +250,12 @@ pub(crate) fn model(reader: &Reader, key: &str, written: &WrittenModel, trailer:
     let within = |name: &str, value, range, unit| reader.within(&format!("{key}.{name}"), value, range, unit);
     Ok(Model {
         // Slip shortens the trailer's lever by so much: it stays well positive.
-        slip_lever: within("slip_lever", written.slip_lever, 0.0..=(trailer.wheelbase - LEAST_LEVER).min(4.0), "m")?,
+        slip_lever: within(
+            "slip_lever",
+            written.slip_lever,
+            0.0..=decimal(trailer.wheelbase - LEAST_LEVER).min(4.0),
+            "m",
+        )?,
         yaw_lag: within("yaw_lag", written.yaw_lag, 0.0..=5.0, "")?,
         drive_lag: within("drive_lag", written.drive_lag, 0.0..=5.0, "s")?,
         brake_lag: within("brake_lag", written.brake_lag, 0.0..=5.0, "s")?,
@@ -264,11 +269,17 @@ pub(crate) fn model(reader: &Reader, key: &str, written: &WrittenModel, trailer:
     })
 }
 
+/// A sum as decimals add up: that of floats may lie below it.
+fn decimal(sum: f64) -> f64 {
+    sum.max((sum * 1e9).round() / 1e9)
+}
+
 fn sensors(reader: &Reader, written: &WrittenSensors, tractor: &Tractor, trailer: &Trailer) -> Result<Sensors, Error> {
     let length = trailer.kingpin_to_front + trailer.kingpin_to_rear;
-    // As decimals add up: the sum of floats may lie below it.
-    let end = length.max((length * 1e9).round() / 1e9);
-    let within = |name, value: f64, from| reader.within(name, value, from..=end, "m").map(|at| at.min(length));
+    let up_to = |end: f64, name: &str, value, from| {
+        reader.within(name, value, from..=decimal(end), "m").map(|at: f64| at.min(end))
+    };
+    let within = |name: &str, value, from| up_to(length, name, value, from);
     let trailer_first = within("sensors.trailer_first", written.trailer_first.unwrap_or(0.0), 0.0)?;
     let trailer_last = within("sensors.trailer_last", written.trailer_last.unwrap_or(length), trailer_first)?;
     let front = tractor.wheelbase + tractor.front_overhang;
@@ -279,7 +290,7 @@ fn sensors(reader: &Reader, written: &WrittenSensors, tractor: &Tractor, trailer
             let key = format!("sensors.tractor_mounts[{index}]");
             let half_width = 0.5 * tractor.width;
             *mount = DVec2::new(
-                reader.within(&format!("{key}[0]"), ahead, -tractor.rear_overhang..=front, "m")?,
+                up_to(front, &format!("{key}[0]"), ahead, -tractor.rear_overhang)?,
                 reader.within(&format!("{key}[1]"), left, -half_width..=half_width, "m")?,
             );
         }

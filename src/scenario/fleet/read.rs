@@ -97,7 +97,8 @@ fn member(reader: &Reader, source: &Source, key: &str, written: &WrittenMember) 
 /// The fleet, whose vehicles make sense whatever is drawn.
 fn drawn(reader: &Reader, members: Vec<Member>, written: &WrittenDraw) -> Result<Fleet, Error> {
     let n_vehicles = reader.count("draw.n_vehicles", written.n_vehicles.unwrap_or(N_VEHICLES), 1..=MOST_VEHICLES)?;
-    let range = |key: &str, range: Option<Exactly<f64, 2>>, [least, greatest]: [f64; 2], unit: &str| {
+    let mut given = Vec::new();
+    let mut range = |key: &'static str, range: Option<Exactly<f64, 2>>, [least, greatest]: [f64; 2], unit: &str| {
         let Some(Exactly(range)) = range else { return Ok(None) };
         for (index, end) in range.into_iter().enumerate() {
             reader.within(&format!("draw.{key}[{index}]"), end, least..=greatest, unit)?;
@@ -110,6 +111,7 @@ fn drawn(reader: &Reader, members: Vec<Member>, written: &WrittenDraw) -> Result
                 "must be [least, greatest]",
             ));
         }
+        given.push(key);
         Ok(Some(range))
     };
     let (length, height, factor, time) =
@@ -143,7 +145,11 @@ fn drawn(reader: &Reader, members: Vec<Member>, written: &WrittenDraw) -> Result
     for (member, vehicle) in fleet.extremes() {
         check_drawn(&vehicle).and_then(|()| check_vehicle(&vehicle)).map_err(|wrong| {
             let expected = format!("of {} with all ranges at their ends: {}", member.name, wrong.expected);
-            reader.invalid("draw", format_args!("{}: {}", wrong.key, wrong.value), expected)
+            let of = wrong.key.strip_prefix("vehicle.").unwrap_or(&wrong.key);
+            // tractor_wheelbase draws tractor.wheelbase.
+            let drawn = given.iter().find(|key| of.ends_with(*key) || of.ends_with(&key.replacen('_', ".", 1)));
+            let key = drawn.map_or("draw".to_owned(), |key| format!("draw.{key}"));
+            reader.invalid(key, format_args!("{of} {}", wrong.value), expected)
         })?;
     }
     Ok(fleet)

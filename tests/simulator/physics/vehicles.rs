@@ -154,6 +154,27 @@ fn a_wrong_vehicle_file_is_refused_with_its_key_its_value_and_what_would_do() {
 }
 
 #[test]
+fn the_ends_of_ranges_that_are_sums_are_those_of_decimals() {
+    let text = std::fs::read_to_string(vehicle_file("daf_xf")).unwrap();
+    let changes = [("wheelbase = 3.543", "wheelbase = 3.61"), ("front_overhang = 1.363", "front_overhang = 1.33")];
+    let longer = changes.iter().fold(text, |text, (from, to)| {
+        assert!(text.contains(from), "{from}");
+        text.replacen(from, to, 1)
+    });
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("truck.toml");
+    // Both sums lie below these as floats.
+    let mounts = format!("[sensors]\ntractor_mounts = [{}]\n", vec!["[4.94, 0.0]"; 13].join(", "));
+    std::fs::write(&file, longer.clone() + "\n" + &mounts).unwrap();
+    assert_eq!(Vehicle::read(&file).unwrap().sensors.tractor_mounts[12].x, 3.61 + 1.33);
+    let short = longer.replacen("wheelbase = 7.756", "wheelbase = 4.1", 1);
+    for (lever, accepted) in [(3.1, true), (3.11, false)] {
+        std::fs::write(&file, format!("{short}\n[model]\nslip_lever = {lever}\n")).unwrap();
+        assert_eq!(Vehicle::read(&file).is_ok(), accepted, "{lever}");
+    }
+}
+
+#[test]
 fn a_file_can_move_its_sensors() {
     let text = std::fs::read_to_string(vehicle_file("daf_xf")).unwrap();
     let mounts: Vec<String> = (0..13).map(|mount| format!("[4.5, {}]", 1.2 - 0.2 * f64::from(mount))).collect();
