@@ -18,7 +18,7 @@ from .policy import Policy
 from .scenarios import Scenario, whole
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Evaluation:
     """What an evaluation found."""
 
@@ -125,6 +125,9 @@ class Evaluation:
         arrived = int((self.ended == Ended.ARRIVED).sum())
         counts = ", ".join(f"{name} {count}" for name, count in self.counts.items())
         return f"{self.scenario} {self.split}: {self.success:.1%} ({arrived}/{self.ended.size}); {counts}"
+
+    def __repr__(self) -> str:
+        return f"<Evaluation on {self}>"
 
 
 def evaluate(

@@ -24,6 +24,7 @@ def test_the_shipped_policy_arrives_on_roundabouts_it_has_never_seen() -> None:
     assert found.success == 1.0 and found.ended.shape == (23, 10)
     assert found.routes[0] == "20m/E-left-2" and set(found.success_by_route.values()) == {1.0}
     assert str(found) == "attard2023 test: 100.0% (230/230); arrived 230"
+    assert repr(found) == "<Evaluation on attard2023 test: 100.0% (230/230); arrived 230>"
 
 
 def test_an_evaluation_counts_what_the_command_line_counts() -> None:
