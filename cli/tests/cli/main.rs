@@ -7,6 +7,7 @@ mod benchmark;
 mod board;
 #[cfg(feature = "browser")]
 mod browser;
+mod budget;
 mod certify;
 mod checkpoint;
 mod compare;

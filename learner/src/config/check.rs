@@ -77,10 +77,16 @@ impl Config {
         Ok(())
     }
 
-    /// An error if a budget of steps ends before the first update, so that nothing is learned, or within an iteration
-    /// of the refinement. `origin` is the file or the flag that gives it.
+    /// An error if a budget of steps ends before the actor has learned anything, or within an iteration of the
+    /// refinement. `origin` is the file or the flag that gives it.
     pub fn check_budget(&self, origin: &Path) -> Result<(), Error> {
-        if let (Some(refinement), Some(steps)) = (&self.refinement, self.steps)
+        let Some(steps) = self.steps else { return Ok(()) };
+        let (unlearned, why) = self.before_actor();
+        if steps <= unlearned {
+            let expected = format!("must be above {unlearned}, or nothing is learned: {why}");
+            return Err(Reader::of(origin).invalid("steps", steps, expected).into());
+        }
+        if let Some(refinement) = &self.refinement
             && steps < (self.n_envs * refinement.n_steps) as u64
         {
             let expected = format!(
@@ -89,24 +95,55 @@ impl Config {
             );
             return Err(Reader::of(origin).invalid("steps", steps, expected).into());
         }
-        let before_updates = self.before_updates();
-        let Some(steps) = self.steps.filter(|&steps| steps <= before_updates) else { return Ok(()) };
-        let expected = format!(
-            "must be above {before_updates}, or nothing is learned: updates begin after replay_buffer.warmup = {} env \
-             steps and learning.n_steps + 1 = {} steps of each truck",
-            self.replay_buffer.warmup,
-            self.learning.n_steps + 1
-        );
-        Err(Reader::of(origin).invalid("steps", steps, expected).into())
+        Ok(())
     }
 
-    /// Env steps before the first update: none of a refinement that begins with a policy, at once.
+    /// Most env steps of a run whose actor does not learn, in the refinement where there is one, and why.
+    fn before_actor(&self) -> (u64, String) {
+        let Config { n_envs, replay_buffer, learning, .. } = self;
+        let (n, before_updates) = (*n_envs as u64, self.before_updates());
+        let begin_of_updates = format!(
+            "updates begin after replay_buffer.warmup = {} env steps and learning.n_steps + 1 = {} steps of each truck",
+            replay_buffer.warmup,
+            learning.n_steps + 1
+        );
+        let Some(refinement) = &self.refinement else {
+            let delay = learning.actor_delay;
+            let delayed = match delay {
+                0 => String::new(),
+                _ => format!(
+                    ", and the actor learns after learning.actor_delay = {delay} of them, \
+                     learning.updates_per_step = {} after each step of n_envs = {n} trucks",
+                    learning.updates_per_step
+                ),
+            };
+            let unlearned = before_updates + delay / learning.updates_per_step as u64 * n;
+            return (unlearned, begin_of_updates + &delayed);
+        };
+        // Without a policy to begin with there is one after the first update.
+        let (before_policy, begin_of_updates) = match self.from {
+            Some(_) => (0, String::new()),
+            None => (before_updates + n, format!("; {begin_of_updates}")),
+        };
+        let of_values = refinement.critic_iterations * refinement.n_steps as u64 * n;
+        let share = match refinement.begin {
+            0.0 => of_values,
+            // It begins with a step of all trucks.
+            begin => ((of_values + n) as f64 / (1.0 - begin)).ceil() as u64,
+        };
+        let why = format!(
+            "the refinement, from refinement.begin = {} of the steps on, changes the policy after \
+             refinement.critic_iterations = {} iterations of refinement.n_steps = {} steps of n_envs = {n} \
+             trucks{begin_of_updates}",
+            refinement.begin, refinement.critic_iterations, refinement.n_steps
+        );
+        (share.max(before_policy + of_values), why)
+    }
+
+    /// Env steps before the first update of soft actor-critic: whole steps of all trucks.
     pub(crate) fn before_updates(&self) -> u64 {
-        if self.from.is_some() && self.refinement.as_ref().is_some_and(|refinement| refinement.begin <= 0.0) {
-            return 0;
-        }
-        let of_trucks = (self.learning.n_steps as u64 + 1) * self.n_envs as u64;
-        of_trucks.max(self.replay_buffer.warmup as u64)
+        let of_each = self.replay_buffer.warmup.div_ceil(self.n_envs).max(self.learning.n_steps + 1);
+        (of_each * self.n_envs) as u64
     }
 }
 
@@ -138,5 +175,77 @@ impl Learning {
         reader.within("learning.entropy.coefficient", self.entropy.coefficient, 1e-9..=1e3, "")?;
         reader.within("learning.entropy.learning_rate", self.entropy.learning_rate, 1e-8..=1.0, "")?;
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use crate::config::Config;
+
+    fn read(file: &str, settings: &[&str]) -> Config {
+        let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
+        Config::read_with(Path::new(file), &settings).unwrap()
+    }
+
+    /// What is wrong with a budget of so many steps.
+    fn fault(config: &Config, steps: u64) -> Option<String> {
+        let config = Config { steps: Some(steps), ..config.clone() };
+        config.check_budget(Path::new("fast.toml")).err().map(|error| error.to_string())
+    }
+
+    /// `most` is refused with each of `expected`, and one step more is not.
+    fn refused_up_to(most: u64, config: &Config, expected: &[&str]) {
+        let message = fault(config, most).unwrap();
+        assert!(
+            message.starts_with(&format!("fast.toml: steps: {most}; must be above {most}, or nothing")),
+            "{message}"
+        );
+        assert!(expected.iter().all(|expected| message.contains(expected)), "{message}");
+        assert_eq!(fault(config, most + 1), None);
+    }
+
+    #[test]
+    fn a_budget_that_ends_before_the_actor_has_learned_is_refused() {
+        // 40 steps of 512 trucks fill the replay buffer with 20000.
+        refused_up_to(20_480, &read("default", &[]), &["replay_buffer.warmup = 20000 env steps and learning.n_steps"]);
+        let delayed = ["learning.actor_delay = 1000 of them, learning.updates_per_step = 4 after each step of n_envs"];
+        refused_up_to(148_480, &read("default", &["learning.actor_delay=1000"]), &delayed);
+        refused_up_to(148_480, &read("default", &["learning.actor_delay=1003"]), &["actor_delay = 1003"]);
+        refused_up_to(148_992, &read("default", &["learning.actor_delay=1004"]), &["actor_delay = 1004"]);
+        assert!(read("default", &["steps=", "minutes=1"]).check_budget(Path::new("fast.toml")).is_ok());
+    }
+
+    #[test]
+    fn a_budget_that_ends_before_the_refinement_changes_the_policy_is_refused() {
+        let keys = ["refinement.critic_iterations = 16 iterations", "refinement.n_steps = 64", "n_envs = 1024"];
+        refused_up_to(16 * 64 * 1024, &read("lane", &[]), &keys);
+        // Half of the budget, but for the last step of all trucks before it, is the refinement's.
+        let half = read("lane", &["refinement.begin=0.5", "learning.actor_delay=1000000000"]);
+        refused_up_to(2 * (16 * 64 + 1) * 1024, &half, &["refinement.begin = 0.5 of the steps"]);
+        // Without a policy one is learned first.
+        let none = read("lane", &["from="]);
+        refused_up_to((16 * 64 + 20 + 1) * 1024, &none, &["replay_buffer.warmup = 20000 env steps"]);
+        let shipped = ["lane", "traffic-refined", "transfer-refined", "default", "paper", "transfer", "traffic"];
+        for file in shipped {
+            let config = read(file, &[]);
+            assert!(config.check_budget(Path::new(file)).is_ok(), "{file}");
+        }
+    }
+
+    #[test]
+    fn a_budget_below_an_iteration_of_the_refinement_is_refused() {
+        let settings = ["refinement.n_steps=10000", "refinement.critic_iterations=0", "replay_buffer.capacity=1000000"];
+        let config = read("lane", &settings);
+        let iteration = config.n_envs as u64 * 10_000;
+        let message = fault(&config, iteration - 1).unwrap();
+        assert!(message.contains("fast.toml: steps: 10239999; must be at least n_envs = "), "{message}");
+        assert_eq!(fault(&config, iteration), None);
+        // One that begins at once with a policy fills no replay buffer first.
+        let mut config = read("lane", &["refinement.n_steps=1", "refinement.critic_iterations=0"]);
+        assert_eq!(fault(&config, 1_024), None);
+        config.from = None;
+        assert!(fault(&config, 5_000).is_some());
     }
 }

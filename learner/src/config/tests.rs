@@ -306,38 +306,6 @@ fn a_file_gives_only_what_differs_from_its_base() {
 }
 
 #[test]
-fn a_budget_that_ends_before_the_first_update_is_refused() {
-    let checked = |steps: &str| {
-        with("steps", steps).unwrap().check_budget(Path::new("fast.toml")).map_err(|error| error.to_string())
-    };
-    let message = checked("steps = 20000").unwrap_err();
-    assert!(message.contains("fast.toml: steps: 20000; must be above 20000, or nothing is learned"), "{message}");
-    assert_eq!(checked("steps = 20001"), Ok(()));
-}
-
-#[test]
-fn a_budget_below_an_iteration_of_the_refinement_is_refused() {
-    let mut config = Config::read(Path::new("lane")).unwrap();
-    let refinement = config.refinement.as_mut().unwrap();
-    refinement.n_steps = 10_000;
-    let iteration = config.n_envs as u64 * 10_000;
-    for (steps, holds) in [(iteration - 1, false), (iteration, true)] {
-        config.steps = Some(steps);
-        let checked = config.check_budget(Path::new("own.toml")).map_err(|error| error.to_string());
-        assert_eq!(checked.is_ok(), holds);
-        if let Err(message) = checked {
-            assert!(message.contains(&format!("own.toml: steps: {steps}; must be at least n_envs = ")), "{message}");
-        }
-    }
-    // One that begins at once with a policy fills no replay buffer first.
-    config.refinement.as_mut().unwrap().n_steps = 1;
-    (config.steps, config.from) = (Some(5_000), None);
-    assert!(config.check_budget(Path::new("own.toml")).is_err());
-    config.from = Some("a policy".to_owned());
-    assert_eq!(config.check_budget(Path::new("own.toml")).map_err(|error| error.to_string()), Ok(()));
-}
-
-#[test]
 fn further_evaluations_are_benchmarks_with_or_without_a_split() {
     let with_also = |list: &str| with("also_evaluate", &format!("also_evaluate = {list}"));
     let config =
