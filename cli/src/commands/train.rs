@@ -98,7 +98,7 @@ fn config(args: &Args, file: &Path) -> Result<Config, Error> {
     Ok(config)
 }
 
-/// An error if `--set` gives a value that a flag of its own gives, too, or gives one twice.
+/// An error if `--set` gives a value that a flag gives, too, or replaces, or gives one twice.
 fn check_settings(args: &Args) -> Result<(), Error> {
     let flags = [
         ("--benchmark", args.benchmark.is_some(), "benchmark"),
@@ -117,6 +117,12 @@ fn check_settings(args: &Args) -> Result<(), Error> {
         let key = key_of(setting);
         if let Some(other) = args.settings[..index].iter().find(|other| key.is_some() && key_of(other) == key) {
             return Err(Error::setting("--set", setting, format!("{other} is given, too: leave one of them out")));
+        }
+        let budgets = [("--steps", args.steps.is_some(), "minutes"), ("--minutes", args.minutes.is_some(), "steps")];
+        if let Some((flag, ..)) = budgets.iter().find(|(_, is_given, other)| *is_given && Some(*other) == key) {
+            let expected =
+                format!("{flag} replaces the whole budget: leave it out, or give steps and minutes by --set");
+            return Err(Error::setting("--set", setting, expected));
         }
         if let Some((flag, ..)) = flags.iter().find(|(_, is_given, own)| *is_given && Some(*own) == key) {
             return Err(Error::setting("--set", setting, format!("{flag} is given, too: leave one of them out")));

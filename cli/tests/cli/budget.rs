@@ -1,4 +1,4 @@
-//! Budgets of `offtrack train`: those in which nothing would be learned.
+//! Budgets of `offtrack train`: those in which nothing would be learned, and flags beside keys of the training file.
 
 use crate::place::{Place, offtrack, refusal};
 
@@ -14,5 +14,16 @@ fn a_budget_too_small_for_any_update_of_the_actor_is_refused() {
     let message = refusal(&offtrack(&refined), 2);
     assert!(message.contains("--steps 65536: steps: 65536; must be above 1048576, or nothing is learned"), "{message}");
     assert!(message.contains("refinement.critic_iterations = 16 iterations"), "{message}");
+    assert!(!place.file("runs").exists());
+}
+
+#[test]
+fn a_flag_that_replaces_the_whole_budget_is_refused_beside_the_other_key_of_it() {
+    let place = Place::new();
+    for (flag, set) in [(["--steps", "5000"], "minutes=1"), (["--minutes", "5"], "steps=1000")] {
+        let message = refusal(&place.train(&[&flag[..], &["--set", set]].concat()), 2);
+        let expected = format!("--set: {set}; {} replaces the whole budget: leave it out, or give", flag[0]);
+        assert!(message.contains(&expected), "{message}");
+    }
     assert!(!place.file("runs").exists());
 }

@@ -30,10 +30,10 @@ pub struct Args {
     /// 3,7,9. Each has its own folder seed-N in the run's folder. The same command with the same --name continues.
     #[arg(long, conflicts_with = "seed")]
     pub(super) seeds: Option<String>,
-    /// Training time in place of the training file's (min).
+    /// Training time in place of the training file's whole budget, its steps too (min).
     #[arg(long)]
     pub(super) minutes: Option<f64>,
-    /// Number of env steps in place of the training file's.
+    /// Number of env steps in place of the training file's whole budget, its minutes too.
     #[arg(long)]
     pub(super) steps: Option<u64>,
     /// Number of trucks in place of the training file's.
