@@ -52,8 +52,10 @@ fn with_bases(file: &Path, depth: usize) -> Result<Table, Error> {
             return Err(invalid(other.to_string(), "must be the name or the path of a training file".to_owned()).into());
         }
     };
-    let path = match shipped(file).is_some() || shipped(Path::new(&base)).is_some() && !beside(file, &base).is_file() {
-        true => PathBuf::from(base.trim_end_matches(".toml")),
+    // A copy of a shipped file names its base as that one does, and has none beside it.
+    let name = Path::new(base.strip_suffix(".toml").unwrap_or(&base));
+    let path = match shipped(file).is_some() || shipped(name).is_some() && !beside(file, &base).is_file() {
+        true => name.to_owned(),
         false => beside(file, &base),
     };
     let mut merged = with_bases(&path, depth + 1).map_err(|error| match &error {

@@ -261,6 +261,13 @@ fn every_training_file_reads_by_path_and_by_name() {
         let by_path = Config::read(&file).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(Config::read(Path::new(file.file_stem().unwrap())).unwrap(), by_path);
     }
+    // A copy finds its base by name where none lies beside it.
+    let copies = tempfile::tempdir().unwrap();
+    for name in ["best", "traffic-refined"] {
+        let copy = copies.path().join("mine.toml");
+        std::fs::copy(files::repository().join(format!("learner/configs/{name}.toml")), &copy).unwrap();
+        assert_eq!(Config::read(&copy).map_err(|error| error.to_string()), Ok(Config::read(Path::new(name)).unwrap()));
+    }
     let message = Config::read(Path::new("papre")).unwrap_err().to_string();
     assert!(
         message.contains(
