@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use serde_json::json;
 
-use crate::place::{Place, offtrack, refusal, succeed};
+use crate::place::{CACHE, Place, offtrack, refusal, succeed};
 
 const NAME: [&str; 2] = ["--name", "many"];
 
@@ -125,4 +125,32 @@ fn seeds_that_cannot_be_compared_are_refused_and_more_can_be_added() {
     assert!(message.contains("exists and is never overwritten"), "{message}");
     let message = refusal(&offtrack(&["train", "--resume", &place.text("runs/alone"), "--seeds", "5"]), 2);
     assert!(message.contains("cannot be used with '--seeds"), "{message}");
+}
+
+#[test]
+fn a_folder_whose_list_of_seeds_was_lost_or_could_not_be_written_is_gone_on_with() {
+    let place = Place::new();
+    // No file may have a byte: as on a full disk nothing is left that would be in the way.
+    let (program, training, runs) = (env!("CARGO_BIN_EXE_offtrack"), place.text("tiny.toml"), place.text("runs"));
+    let full = format!("trap '' XFSZ; ulimit -f 0; exec {program} train {training} --out {runs} --name many --seeds 5");
+    let output = Command::new("sh").env("OFFTRACK_CACHE", CACHE).args(["-c", &full]).output().unwrap();
+    let message = refusal(&output, 1);
+    assert!(message.contains("seeds.json: cannot be written"), "{message}");
+    assert!(!place.file("runs/many").exists());
+    // An empty one, of a command that was killed.
+    std::fs::create_dir_all(place.file("runs/many")).unwrap();
+    let train = |seeds: &str| place.train(&[&NAME[..], &["--seeds", seeds]].concat());
+    succeed(&train("5"));
+    std::fs::remove_file(place.file("runs/many/seeds.json")).unwrap();
+    let message = refusal(&train("6"), 2);
+    assert!(message.contains("--seeds: 6; ") && message.contains("many has seed 5 too: name it as well"), "{message}");
+    let finished = bytes(&place, "many/seed-5/checkpoint.safetensors");
+    succeed(&train("5,6"));
+    assert!(bytes(&place, "many/seed-5/checkpoint.safetensors") == finished);
+    assert_eq!(place.json("runs/many/seeds.json")["runs"].as_array().unwrap().len(), 2);
+    // What has anything else in it is no such folder.
+    std::fs::remove_file(place.file("runs/many/seeds.json")).unwrap();
+    std::fs::write(place.file("runs/many/notes.txt"), "").unwrap();
+    let message = refusal(&train("5,6"), 2);
+    assert!(message.contains("exists and is never overwritten"), "{message}");
 }

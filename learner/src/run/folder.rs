@@ -126,11 +126,15 @@ pub fn make(runs: &Path, name: Option<&str>, config_file: &Path) -> Result<PathB
     }
 }
 
-fn named(runs: &Path, name: &str) -> Result<PathBuf, Error> {
-    let plain = name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c))
+/// Whether a run's folder may have this name.
+pub(crate) fn is_plain(name: &str) -> bool {
+    name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c))
         && !name.starts_with('.')
-        && (1..=LONGEST_NAME).contains(&name.len());
-    if !plain {
+        && (1..=LONGEST_NAME).contains(&name.len())
+}
+
+fn named(runs: &Path, name: &str) -> Result<PathBuf, Error> {
+    if !is_plain(name) {
         let expected =
             format!("a name of 1 to {LONGEST_NAME} letters, digits, `-`, `_` and `.`, not the last first, is needed");
         return Err(Error::setting("--name", format!("{name:?}"), expected));

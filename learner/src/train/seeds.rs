@@ -52,7 +52,8 @@ impl Training {
         caller: Caller,
     ) -> Result<SeedsOutcome, Error> {
         let of_seed = |seed: u32| Config { seed, ..self.config.clone() };
-        let earlier = name.map(|name| Group(runs.join(name))).filter(|group| group.file().is_file());
+        let earlier = name.filter(|name| folder::is_plain(name)).map(|name| Group(runs.join(name)));
+        let earlier = earlier.filter(Group::is_earlier);
         if let Some(group) = &earlier {
             group.check(seeds, &self.config)?;
         }
@@ -63,10 +64,17 @@ impl Training {
         // All that can be wrong with the input is found before a folder is made.
         let mut prepared = next.map(|seed| self.prepare(&of_seed(seed), true)).transpose()?;
         let group = match earlier {
-            Some(group) => group,
-            None => Group(folder::make(runs, name, file)?),
+            Some(group) => {
+                group.write(seeds)?;
+                group
+            }
+            None => {
+                let group = Group(folder::make(runs, name, file)?);
+                // An empty folder would only be in the way of the next attempt.
+                group.write(seeds).inspect_err(|_| drop(std::fs::remove_dir(&group.0)))?;
+                group
+            }
         };
-        group.write(seeds)?;
         for (index, &seed) in seeds.iter().enumerate() {
             if caller.stops() {
                 break;
@@ -112,13 +120,40 @@ impl Group {
         self.0.join(Group::folder_name(seed))
     }
 
-    /// Whether a call with these seeds and this config, whatever its seed, can go on in this folder.
-    fn check(&self, seeds: &[u32], config: &Config) -> Result<(), Error> {
+    /// Whether the folder is of an earlier call: it has `seeds.json` or, if that was lost or could not be written,
+    /// nothing but seeds' folders.
+    fn is_earlier(&self) -> bool {
+        self.file().is_file() || self.seeds_of_folders().is_some()
+    }
+
+    /// The seeds whose folders are all that the folder has; none where it has anything else.
+    fn seeds_of_folders(&self) -> Option<Vec<u32>> {
+        let seed = |entry: std::fs::DirEntry| {
+            let (name, path) = (entry.file_name().into_string().ok()?, entry.path());
+            let seed = name.strip_prefix("seed-")?.parse().ok()?;
+            (path.is_dir() && name == Group::folder_name(seed)).then_some(seed)
+        };
+        let mut seeds: Vec<u32> =
+            std::fs::read_dir(&self.0).ok()?.map(|entry| seed(entry.ok()?)).collect::<Option<_>>()?;
+        seeds.sort_unstable();
+        Some(seeds)
+    }
+
+    /// The seeds of the earlier call.
+    fn earlier_seeds(&self) -> Result<Vec<u32>, Error> {
         let file = self.file();
+        if let Some(seeds) = self.seeds_of_folders() {
+            return Ok(seeds);
+        }
         let earlier: Earlier = serde_json::from_str(&read_text(&file, REPORT_LIMIT)?).map_err(|error| {
             Error::contents(&file, format!("{error}; it must be as `train --seeds` has written it"))
         })?;
-        if let Some(missing) = earlier.seeds.iter().find(|seed| !seeds.contains(seed)) {
+        Ok(earlier.seeds)
+    }
+
+    /// Whether a call with these seeds and this config, whatever its seed, can go on in this folder.
+    fn check(&self, seeds: &[u32], config: &Config) -> Result<(), Error> {
+        if let Some(missing) = self.earlier_seeds()?.iter().find(|seed| !seeds.contains(seed)) {
             let expected =
                 format!("{} has seed {missing} too: name it as well, or choose another --name", self.0.display());
             return Err(Error::setting("--seeds", shown(seeds), expected));
