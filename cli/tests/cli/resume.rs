@@ -291,7 +291,7 @@ fn a_run_that_cannot_go_on_is_refused_with_the_file_and_what_would_do() {
     refused(
         "runs/run/config.toml",
         other.as_bytes(),
-        &["runs/run/config.toml", "is not the training file that the checkpoint"],
+        &["runs/run/config.toml: learning.gamma: 0.9; the checkpoint was written with 0.97: put that back"],
     );
     let list = "runs/run/policies/policies.json";
     refused(list, b"[{", &[list, "is not the list of a run's policies", "put a copy of it back"]);

@@ -38,7 +38,11 @@ impl MetricsFile {
     /// The file of a run that continues; its lock is taken.
     pub fn open(path: PathBuf) -> Result<MetricsFile, Error> {
         let read = OpenOptions::new().read(true).append(true).open(&path);
-        let file = read.map_err(Error::read(&path))?;
+        // What can be read cannot be written.
+        let file = read.map_err(|error| match File::open(&path) {
+            Ok(_) => Error::write(&path)(error),
+            Err(_) => Error::read(&path)(error),
+        })?;
         let metrics_file =
             MetricsFile { length: file.metadata().map_err(Error::read(&path))?.len(), path, file, is_new: false };
         metrics_file.lock()?;
@@ -114,5 +118,19 @@ impl MetricsFile {
         self.file.set_len(length).map_err(Error::write(&self.path))?;
         self.length = length;
         Ok(())
+    }
+}
+
+#[cfg(all(test, target_os = "linux"))]
+mod tests {
+    use super::MetricsFile;
+
+    #[test]
+    fn a_file_that_may_be_read_but_not_written_is_said_to_be_so_and_is_no_wrong_input() {
+        // A program that runs is no one's to write.
+        let path = std::env::current_exe().unwrap();
+        let error = MetricsFile::open(path.clone()).unwrap_err();
+        assert!(error.to_string().starts_with(&format!("{}: cannot be written: ", path.display())), "{error}");
+        assert!(!error.is_wrong_input());
     }
 }

@@ -56,9 +56,11 @@ impl Resumed {
         let stored = Stored::read(&folder.checkpoint())?;
         let written =
             toml::from_str(stored.config()).map_err(|error| stored.error(format!("its training file: {error}")))?;
-        if !config.is_same_run(&written) {
-            let message = "is not the training file that the checkpoint was written with; only minutes, steps and \
-                checkpoint_minutes may differ";
+        if let Some((key, now, before)) = config.hindrance(&written) {
+            let message = format!(
+                "{key}: {now}; the checkpoint was written with {before}: put that back; only minutes, steps and \
+                 checkpoint_minutes may differ"
+            );
             return Err(Error::contents(&folder.config(), message));
         }
         give_budget(&mut config, minutes, steps)?;
