@@ -204,7 +204,7 @@ fn named(names: &[String], grounds: &[Ground]) -> Result<Vec<Policy>, Error> {
 fn check(policy: &Policy, value: &str, flag: &'static str, grounds: &[Ground]) -> Result<(), Error> {
     if !policy.is_plain() {
         let expected = "a page drives by layers over the values of one step, with an output an action: this policy \
-                        has a memory, reads some of the values or gives commands"
+                        has a memory, sees several steps, reads some of the values or gives commands"
             .to_owned();
         return Err(Error::Setting { name: flag, value: value.to_owned(), expected });
     }

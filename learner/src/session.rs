@@ -18,6 +18,7 @@ use super::ppo::Ppo;
 use super::rollout::Rollout;
 use super::sac::{Learner, Update};
 use crate::error::Error;
+use offtrack_evaluation::error::Error as Evaluation;
 use offtrack_evaluation::policies;
 
 /// Trucks, replay buffer and learner.
@@ -56,7 +57,13 @@ impl Session {
     /// other actions or layers is an error.
     pub fn begin(&mut self) -> Result<(), Error> {
         let Some(from) = &self.config.from else { return Ok(()) };
-        let policy = policies::learned(from)?;
+        let policy = policies::learned(from).map_err(|error| match error {
+            Evaluation::Policy(offtrack_policy::Error::UnknownName { name, known }) => {
+                let expected = format!("must be the path of a policy file or one of {}", known.join(", "));
+                Error::setting("from", format!("{name:?}"), expected)
+            }
+            error => error.into(),
+        })?;
         policy.check(&self.world)?;
         if !policy.is_plain() {
             let expected = "has a memory, several frames, values of its own or commands: the learner continues with a \

@@ -35,7 +35,7 @@ pub enum Error {
         why: String,
     },
     /// No policy of this name comes with the program.
-    #[error("policy: {}; the program comes with {}", shortened(name, LONGEST_PATH), known.join(", "))]
+    #[error("policy: {}; the program comes with {}; or give a path", shortened(name, LONGEST_PATH), known.join(", "))]
     UnknownName {
         /// The name that was asked for.
         name: String,

@@ -113,7 +113,7 @@ fn the_shipped_policies_are_written_as_they_were_read_byte_for_byte() {
     let message = Policy::shipped("mine").unwrap_err().to_string();
     let names = "attard2023, attard2023-lane, attard2023-as-run, laden2026, laden2026-50, transfer2026, traffic2026, \
                  traffic2026-laden";
-    assert_eq!(message, format!("policy: mine; the program comes with {names}"));
+    assert_eq!(message, format!("policy: mine; the program comes with {names}; or give a path"));
     let world = |benchmark: &str| World::bake(&Scenario::named(benchmark).unwrap()).unwrap();
     for (benchmark, expected) in [
         ("attard2023-full", "attard2023"),

@@ -240,6 +240,8 @@ fn a_run_that_begins_with_a_policy_keeps_it_until_the_actor_learns() {
         ),
         (vec!["--from", "attard2023"], "learned with another action table"),
         (vec!["--from", "nowhere.safetensors"], "nowhere.safetensors"),
+        (vec!["--from", "nosuch"], "from: \"nosuch\"; must be the path of a policy file or one of attard2023, "),
+        (vec!["--set", "from=\"\""], "from: \"\"; must be the path of a policy file or one of attard2023, "),
         (vec!["--from", &frames], "has a memory, several frames, values of its own or commands: the learner continues"),
         (vec!["--from", &tanh], "has the activation tanh: the learner continues with relu alone"),
     ] {

@@ -124,6 +124,8 @@ fn a_folder_that_is_no_run_or_has_no_policies_for_the_benchmark_is_refused_with_
     succeed(&place.train(&["--name", "framed", "--steps", "4000"]));
     let framed = place.text("runs/framed");
     refused(&[&["--run", &framed], &to[..]].concat(), &["--run", "its policy sees 3 observations"]);
+    let policy = place.text("runs/framed/policy.safetensors");
+    refused(&[&["--policy", &policy], &to[..]].concat(), &["--policy", "has a memory, sees several steps, reads some"]);
 }
 
 #[test]

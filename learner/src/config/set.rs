@@ -28,6 +28,9 @@ fn one(table: &mut Table, setting: &str) -> Result<(), Error> {
         setting.split_once('=').ok_or_else(|| wrong("KEY=VALUE is needed, as in learning.n_steps=5".into()))?;
     let path: Vec<&str> = key.trim().split('.').collect();
     let [tables @ .., last] = path.as_slice() else { return Err(wrong("a key is needed before the `=`".into())) };
+    if let [key @ ("base" | "without"), ..] = path.as_slice() {
+        return Err(wrong(format!("{key} stands in a training file alone: write one with it, and give that file")));
+    }
     if path.iter().any(|part| part.is_empty()) {
         return Err(wrong("a key is needed before the `=`, its parts joined by single points".into()));
     }

@@ -67,6 +67,9 @@ fn a_key_set_wrongly_is_refused_with_what_would_do() {
         ("reward.lane_distance_limit=51", "reward.lane_distance_limit: 51 m; must lie in 0.1..50 m"),
         ("reward.waypoint=nan", "reward.waypoint: NaN; must lie in"),
         ("reward.kerb=-1", "unknown field `kerb`"),
+        ("base=best", "--set: base=best; base stands in a training file alone: write one with it, and give"),
+        ("without=[\"validation\"]", "--set: without=[\"validation\"]; without stands in a training file alone"),
+        ("base=", "--set: base=; base stands in a training file alone"),
         ("adapter=llvmpipe", "adapter: given; works with device = \"gpu\" alone"),
     ] {
         let message = with_set(&[setting]).unwrap_err();
