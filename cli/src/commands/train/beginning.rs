@@ -5,8 +5,8 @@ use std::path::Path;
 use offtrack::files::reader::{printable, shown_path};
 use offtrack_learner::config::Config;
 
-/// Time of the default run, as docs/results.md has it: two quiet cores, and one core beside other work.
-const DEFAULT_TIME: &str = "three to five minutes on two idle cores, a quarter of an hour on busy ones";
+/// Time of the default run, as docs/results.md has it.
+const DEFAULT_TIME: &str = "four to nine minutes of a core";
 
 /// A line about `n_runs` runs of a training file.
 pub fn line(config: &Config, file: &Path, n_runs: usize) -> String {
@@ -45,7 +45,7 @@ mod tests {
             let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
             line(&Config::read_with(default, &settings).unwrap(), default, n_runs)
         };
-        let usual = "default: trains for 4800000 env steps of 512 trucks: three to five minutes on two idle cores";
+        let usual = "default: trains for 4800000 env steps of 512 trucks: four to nine minutes of a core; then";
         assert!(said(&[], 1).starts_with(usual) && said(&["seed=3"], 1).starts_with(usual), "{}", said(&[], 1));
         assert!(
             said(&["steps=9600000"], 1).contains("of 512 trucks; while it trains a line says how long is left; then")
