@@ -149,9 +149,8 @@ pub(super) fn malformed(text: &str, error: &toml::de::Error) -> String {
     let message = shortened(&said(error), LONGEST_MESSAGE);
     let Some(span) = error.span() else { return message };
     let at = (0..=span.start.min(text.len())).rev().find(|&at| text.is_char_boundary(at)).unwrap_or(0);
-    // What a whole file lacks is told of all of it, whatever its first line is.
-    let is_of_all = span.start == 0 && text.trim_end().len() <= span.end;
-    let table = table_at(text, at).filter(|_| !is_of_all);
+    // What a whole file lacks has an empty span at its beginning, whatever its first line is.
+    let table = table_at(text, at).filter(|_| span != (0..0));
     if table.is_none() && message.starts_with("missing field") {
         return format!("{message} at the top level");
     }

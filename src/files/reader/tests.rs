@@ -91,6 +91,32 @@ fn a_missing_key_of_no_table_is_said_to_be_missing_at_the_top_level() {
 }
 
 #[test]
+fn a_missing_key_is_that_of_the_file_or_of_its_first_table_where_the_file_begins_with_one() {
+    #[derive(Debug, serde::Deserialize)]
+    #[expect(dead_code, reason = "only parsed")]
+    struct Unit {
+        wheelbase: f64,
+    }
+    #[derive(Debug, serde::Deserialize)]
+    #[expect(dead_code, reason = "only parsed")]
+    struct File {
+        #[serde(default)]
+        tractor: Option<Unit>,
+        #[serde(default)]
+        vehicle: Vec<Unit>,
+        loads: Vec<f64>,
+    }
+    for (text, expected) in [
+        ("[tractor]\nwheelbase = 1.0\n", "x: missing field `loads` at the top level"),
+        ("[[vehicle]]\nwheelbase = 1.0\n[[vehicle]]\nwheelbase = 2.0", "x: missing field `loads` at the top level"),
+        ("[tractor]", "x: line 1, column 1: tractor: missing field `wheelbase`; the line is: [tractor]"),
+        ("[[vehicle]]\n", "x: line 1, column 1: vehicle[0]: missing field `wheelbase`; the line is: [[vehicle]]"),
+    ] {
+        assert_eq!(Reader::parse::<File>(Path::new("x"), text).unwrap_err().to_string(), expected);
+    }
+}
+
+#[test]
 fn a_line_of_a_mebibyte_is_repeated_around_the_fault_only() {
     let long = "x".repeat(1 << 20);
     for text in [
