@@ -197,6 +197,27 @@ impl<'a> Reader<'a> {
         if range.contains(&value) {
             return Ok(value);
         }
-        Err(self.invalid(key, value, format!("must lie in {}..{}", range.start(), range.end())))
+        Err(self.invalid(key, value, counts(&range)))
+    }
+
+    /// The length of a list within `range`; `what` are its values, for the message: `layers`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Invalid`].
+    pub fn length(&self, key: &str, n: usize, range: RangeInclusive<usize>, what: &str) -> Result<usize, Error> {
+        if range.contains(&n) {
+            return Ok(n);
+        }
+        let what = if n == 1 { what.strip_suffix('s').unwrap_or(what) } else { what };
+        Err(self.invalid(key, format_args!("{n} {what}"), counts(&range)))
+    }
+}
+
+/// What a count may be.
+fn counts(range: &RangeInclusive<usize>) -> String {
+    match (range.start(), range.end()) {
+        (first, last) if first == last => format!("must be {first}"),
+        (first, last) => format!("must lie in {first}..{last}"),
     }
 }

@@ -27,7 +27,7 @@ impl Scenario {
         let procedural =
             written.procedural.as_ref().map(|written| Procedural::checked(&reader, source, written)).transpose()?;
         if procedural.is_none() {
-            reader.count("roundabout", written.roundabout.len(), 1..=MOST_ROADS)?;
+            reader.length("roundabout", written.roundabout.len(), 1..=MOST_ROADS, "tables")?;
         }
         for (index, roundabout) in written.roundabout.iter().enumerate() {
             scenario.add_file(&reader, &format!("roundabout[{index}]"), source, roundabout)?;

@@ -285,7 +285,7 @@ fn sensors(reader: &Reader, written: &WrittenSensors, tractor: &Tractor, trailer
     let front = tractor.wheelbase + tractor.front_overhang;
     let mut tractor_mounts = [DVec2::new(front, 0.0); N_TRACTOR_RAYS];
     if let Some(mounts) = &written.tractor_mounts {
-        reader.count("sensors.tractor_mounts", mounts.len(), N_TRACTOR_RAYS..=N_TRACTOR_RAYS)?;
+        reader.length("sensors.tractor_mounts", mounts.len(), N_TRACTOR_RAYS..=N_TRACTOR_RAYS, "mounts")?;
         for (index, (mount, &Exactly([ahead, left]))) in tractor_mounts.iter_mut().zip(mounts).enumerate() {
             let key = format!("sensors.tractor_mounts[{index}]");
             let half_width = 0.5 * tractor.width;

@@ -135,7 +135,7 @@ fn a_benchmark_without_any_roundabout_is_refused() {
     let path = benchmark(folder.path(), ROADS);
     let text = std::fs::read_to_string(&path).unwrap();
     std::fs::write(&path, text.split("[procedural]").next().unwrap()).unwrap();
-    assert!(Scenario::read(&path).unwrap_err().to_string().contains("roundabout: 0; must lie in 1..100000"));
+    assert!(Scenario::read(&path).unwrap_err().to_string().contains("roundabout: 0 tables; must lie in 1..100000"));
 }
 
 #[test]

@@ -149,7 +149,7 @@ impl Config {
 
 impl Learning {
     fn check(&self, reader: &Reader) -> Result<(), Error> {
-        reader.count("learning.hidden", self.hidden.len(), 1..=8)?;
+        reader.length("learning.hidden", self.hidden.len(), 1..=8, "layers")?;
         for (index, &size) in self.hidden.iter().enumerate() {
             reader.count(&format!("learning.hidden[{index}]"), size, 1..=8192)?;
         }

@@ -51,7 +51,7 @@ fn every_value_out_of_its_range_is_refused_with_its_key_and_what_would_do() {
         ("capacity", "capacity = 10", "replay_buffer.capacity: 10; must lie in 1000.."),
         ("warmup", "warmup = 0", "replay_buffer.warmup: 0; must lie in 1.."),
         ("warmup", "warmup = 90000000", "replay_buffer.warmup: 90000000; must lie in 1.."),
-        ("hidden", "hidden = []", "learning.hidden: 0; must lie in 1..8"),
+        ("hidden", "hidden = []", "learning.hidden: 0 layers; must lie in 1..8"),
         ("hidden", "hidden = [64, 0]", "learning.hidden[1]: 0; must lie in 1..8192"),
         ("batch", "batch = 1", "learning.batch: 1; must lie in 2.."),
         ("updates_per_step", "updates_per_step = 0", "learning.updates_per_step: 0; must lie in 1.."),

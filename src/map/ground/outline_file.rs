@@ -177,11 +177,11 @@ impl Ground {
         let island_radius = reader.within("island_radius", written.island_radius, 0.0..=500.0, "m")?;
         let is_ring = 0.0 < island_radius;
         let outer_radius = reader.within("outer_radius", written.outer_radius, island_radius.max(0.5)..=600.0, "m")?;
-        reader.count("lane_radii", written.lane_radii.len(), usize::from(is_ring)..=16)?;
+        reader.length("lane_radii", written.lane_radii.len(), usize::from(is_ring)..=16, "values")?;
         for (i, &radius) in written.lane_radii.iter().enumerate() {
             reader.within(&format!("lane_radii[{i}]"), radius, 0.5..=600.0, "m")?;
         }
-        reader.count("arm", written.arm.len(), 1..=8)?;
+        reader.length("arm", written.arm.len(), 1..=8, "tables")?;
         let mut arms: Vec<Arm> = Vec::new();
         for (i, WrittenArm { name, bearing_deg }) in written.arm.into_iter().enumerate() {
             let usual = !name.is_empty() && name.len() <= 20 && name.chars().all(|c| c.is_ascii_alphanumeric());
@@ -196,7 +196,7 @@ impl Ground {
         }
         let (faces, kerbs) = loops(&reader, "face", written.face, &arms, is_ring)?;
         let (edges, _) = loops(&reader, "edge", written.edge, &arms, is_ring)?;
-        reader.count("route", written.route.len(), 1..=MOST_ROUTES)?;
+        reader.length("route", written.route.len(), 1..=MOST_ROUTES, "tables")?;
         let mut lines: Vec<Line> = Vec::new();
         for (i, route) in written.route.into_iter().enumerate() {
             let key = |name: &str| format!("route[{i}].{name}");
@@ -228,14 +228,14 @@ impl Ground {
             });
         }
         lines.sort_by_key(|line| (line.entry, line.lane == Lane::Right, line.exit));
-        reader.count("lane", written.lane.len(), 0..=1000)?;
+        reader.length("lane", written.lane.len(), 0..=1000, "tables")?;
         let lanes = written
             .lane
             .iter()
             .enumerate()
             .map(|(i, lane)| curve(&reader, &format!("lane[{i}].path"), &lane.path, false));
         let lanes = lanes.collect::<Result<_, _>>()?;
-        reader.count("apron", written.apron.len(), 0..=MOST_LOOPS)?;
+        reader.length("apron", written.apron.len(), 0..=MOST_LOOPS, "tables")?;
         let aprons = written.apron.iter().enumerate().map(|(i, apron)| {
             let key = format!("apron[{i}].path");
             curve(&reader, &key, &apron.path, true).map(|apron| (key, apron))
@@ -302,7 +302,7 @@ fn path(curve: &Curve, closed: bool) -> String {
 
 /// The curve along a path.
 fn curve(reader: &Reader, key: &str, path: &[Vec<f64>], closed: bool) -> Result<Curve, Error> {
-    reader.count(key, path.len(), 2..=MOST_POINTS)?;
+    reader.length(key, path.len(), 2..=MOST_POINTS, "points")?;
     let point = |i: usize| -> Result<DVec2, Error> {
         if !(2..=3).contains(&path[i].len()) {
             return Err(reader.invalid(
@@ -348,7 +348,7 @@ fn loops(
     arms: &[Arm],
     is_ring: bool,
 ) -> Result<(Outline, Vec<Kerb>), Error> {
-    reader.count(table, written.len(), 1 + usize::from(is_ring)..=MOST_LOOPS)?;
+    reader.length(table, written.len(), 1 + usize::from(is_ring)..=MOST_LOOPS, "tables")?;
     let (mut curves, mut kerbs): (Vec<Curve>, Vec<Kerb>) = (Vec::new(), Vec::new());
     for (i, WrittenLoop { of, path }) in written.into_iter().enumerate() {
         let loop_ = curve(reader, &format!("{table}[{i}].path"), &path, true)?;

@@ -114,7 +114,7 @@ fn profile(
 ) -> Result<Profile, Error> {
     let around = name == "bearing_deg";
     let unit = if around { "deg" } else { "m" };
-    reader.count(key, written.len(), 1..=MOST_POINTS)?;
+    reader.length(key, written.len(), 1..=MOST_POINTS, "points")?;
     let mut points: Vec<(f64, f64)> = Vec::new();
     for (index, &(x, width)) in written.iter().enumerate() {
         let x = reader.within(&format!("{key}[{index}].{name}"), x, range.clone(), unit)?;

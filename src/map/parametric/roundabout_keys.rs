@@ -174,7 +174,7 @@ impl Written {
                 "m",
             )?,
         };
-        reader.count("arm", self.arm.len(), 2..=8)?;
+        reader.length("arm", self.arm.len(), 2..=8, "tables")?;
         let arms: Vec<Arm> = self
             .arm
             .into_iter()
@@ -236,7 +236,7 @@ impl WrittenArm {
         });
         let splitter: Vec<Bend> = splitter.collect::<Result<_, Error>>()?;
         if !splitter.is_empty() {
-            reader.count(&key("splitter"), splitter.len(), 3..=16)?;
+            reader.length(&key("splitter"), splitter.len(), 3..=16, "points")?;
         }
         let lane_on_ring = self.corner.lane_on_ring(reader, &key("corner.lane"))?;
         Ok(Arm {
@@ -295,7 +295,7 @@ impl WrittenWay {
 impl WrittenAlignment {
     /// `least` is the smallest radius of a bend (m).
     fn checked(self, reader: &Reader, key: &str, way: Way, length: f64, least: f64) -> Result<Alignment, Error> {
-        reader.count(&format!("{key}.points"), self.points.len(), 1..=8)?;
+        reader.length(&format!("{key}.points"), self.points.len(), 1..=8, "points")?;
         let last = self.points.len() - 1;
         let side = if way == Way::Entry { 1.0 } else { -1.0 };
         let mut bends = vec![Bend { at: DVec2::new(length, side * self.points[0].offset), radius: 0.0 }];

@@ -212,7 +212,7 @@ fn an_island_too_large_for_the_arms_is_refused() {
 fn nine_arms_are_too_many() {
     let arm = &plain()[plain().find("[[arm]]").unwrap()..];
     let text = plain() + "\n" + arm + "\n" + arm;
-    assert!(read(&text).map(|_| ()).unwrap_err().to_string().contains("arm: 12; must lie in 2..8"));
+    assert!(read(&text).map(|_| ()).unwrap_err().to_string().contains("arm: 12 tables; must lie in 2..8"));
 }
 
 #[test]

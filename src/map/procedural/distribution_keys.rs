@@ -288,7 +288,7 @@ impl Keys {
         }
         reader.within("rules.truck_width", rules.truck_width, 1.0..=4.0, "m")?;
         weights(reader, "arms.shares", &*arms.shares)?;
-        reader.count("corners.shares", corners.shares.len(), 1..=16)?;
+        reader.length("corners.shares", corners.shares.len(), 1..=16, "values")?;
         for (index, &share) in corners.shares.iter().enumerate() {
             reader.within(&format!("corners.shares[{index}]"), share, 0.0..=1.0, "")?;
         }

@@ -47,7 +47,7 @@ pub(in crate::scenario) fn vehicles(
                     "each [[vehicle]] has its own `loads`: leave it out",
                 ));
             }
-            reader.count("vehicle", tables.len(), 1..=MOST_MEMBERS)?;
+            reader.length("vehicle", tables.len(), 1..=MOST_MEMBERS, "tables")?;
             let read = |(index, table)| member(reader, source, &format!("vehicle[{index}]"), table);
             tables.iter().enumerate().map(read).collect::<Result<Vec<Member>, Error>>()?
         }

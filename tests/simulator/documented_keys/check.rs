@@ -225,8 +225,12 @@ fn stated(error: &Error, place: &[Step]) -> Option<(Ends, String)> {
     match error {
         Error::Invalid { key, expected, .. } => {
             key.strip_prefix(&place).filter(|rest| rest.is_empty() || rest.starts_with(['[', '.']))?;
-            let range = expected.strip_prefix("must lie in ")?;
-            Some((ends(range)?, range.split_once(' ').map(|(_, unit)| unit.to_owned()).unwrap_or_default()))
+            let only = expected.strip_prefix("must be ").filter(|only| only.parse::<f64>().is_ok());
+            let range = match only {
+                Some(only) => format!("{only}..{only}"),
+                None => expected.strip_prefix("must lie in ")?.to_owned(),
+            };
+            Some((ends(&range)?, range.split_once(' ').map(|(_, unit)| unit.to_owned()).unwrap_or_default()))
         }
         Error::Malformed { message, .. } if message.contains("expected a whole number in 0..4294967295") => {
             message.contains(place.rsplit('.').next()?).then_some(([Some(0.0), Some(u32::MAX.into())], String::new()))

@@ -120,7 +120,7 @@ fn a_wrong_vehicle_file_is_refused_with_its_key_its_value_and_what_would_do() {
         (
             "[loads.empty]",
             "[sensors]\ntractor_mounts = [[4.0, 0.0]]\n[loads.empty]",
-            "sensors.tractor_mounts: 1; must lie in 13..13",
+            "sensors.tractor_mounts: 1 mount; must be 13",
         ),
         (
             "[loads.empty]",

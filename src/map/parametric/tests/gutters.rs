@@ -90,7 +90,7 @@ fn gutters_that_make_no_sense_are_refused_with_their_keys() {
         let message = read(&with(ring, arm)).unwrap_err().to_string();
         assert!(message.contains(expected), "{message}");
     };
-    refused("island_gutter = []\n", "", "ring.island_gutter: 0; must lie in 1..64");
+    refused("island_gutter = []\n", "", "ring.island_gutter: 0 points; must lie in 1..64");
     refused(
         "island_gutter = [{ bearing_deg = 0.0, width = 4.0 }]\n",
         "",
