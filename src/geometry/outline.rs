@@ -209,6 +209,31 @@ impl Nearby {
         nearby
     }
 
+    /// The point of a segment within the radius given to [`Outline::near`] that is nearest to the outline, and its
+    /// distance, exact where they do not cross (m).
+    pub fn nearest_of(&self, from: DVec2, to: DVec2) -> (DVec2, f64) {
+        let along = to - from;
+        let length_squared = along.length_squared().max(f64::MIN_POSITIVE);
+        let beside = |p: DVec2| from + ((p - from).dot(along) / length_squared).clamp(0.0, 1.0) * along;
+        let of_piece = |placed: &Placed| {
+            let opposite = match placed.piece {
+                Piece::Segment { .. } => placed.start,
+                Piece::Arc { centre, .. } => centre,
+            };
+            let feet = [from, to, beside(placed.start), beside(placed.end), beside(opposite)];
+            feet.map(|p| (p, placed.distance(p)))
+        };
+        self.pieces.iter().flat_map(of_piece).fold((from, f64::INFINITY), |a, b| if b.1 < a.1 { b } else { a })
+    }
+
+    /// Where a segment within the radius given to [`Outline::near`] crosses or touches the outline, from its beginning.
+    pub fn crossings(&self, from: DVec2, to: DVec2) -> Vec<DVec2> {
+        let segment = Piece::Segment { from, to };
+        let mut found: Vec<DVec2> = self.pieces.iter().flat_map(|placed| segment.meetings(&placed.piece)).collect();
+        found.sort_by(|a, b| a.distance_squared(from).total_cmp(&b.distance_squared(from)));
+        found
+    }
+
     /// The piece that is nearest to `p`.
     pub fn nearest_piece(&self, p: DVec2) -> usize {
         let all = self.pieces.iter().enumerate().map(|(index, placed)| (placed.distance(p), index));

@@ -7,6 +7,10 @@ use crate::geometry::{Outline, Piece};
 
 /// Distance between the points of an outline at which clearance is computed (m).
 const BETWEEN_POINTS: f64 = 0.05;
+/// The same on the path of a corner from a pose to the next that leads over a kerb (m).
+const BETWEEN_CORNERS: f64 = 0.01;
+/// What lies between these points, or between two poses, counts where it is nearer by more than this (m).
+const NEARER: f64 = 0.005;
 /// How deep an overlap that no point of the outline shows is at least: it is looked for so far inside (m).
 const HIDDEN: f64 = 0.002;
 /// Largest distance of a swept area's corner that is left out from the edge without it (m).
@@ -17,7 +21,7 @@ const SMALLEST: f64 = 1e-3;
 /// How near a unit comes to the kerbs along a path.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UnitClearance {
-    /// Least signed distance of the unit's outline from the kerbs, negative beyond one (m).
+    /// Least signed distance from the kerbs of what the unit sweeps, negative beyond one (m).
     pub least: f64,
     /// The point of the unit's outline where that is (m).
     pub at: DVec2,
@@ -25,33 +29,94 @@ pub struct UnitClearance {
     pub overlaps: Vec<(DVec2, f64)>,
 }
 
+/// The point of a unit that is nearest to a kerb or deepest in one, its signed distance (m), and whether it overlaps.
+type Near = (DVec2, f64, bool);
+
 impl UnitClearance {
-    /// Of a unit with its corners in order around it at each pose.
+    /// Of a unit with its corners in order around it at each pose; corners move straight from pose to pose, as those of
+    /// [`swept_area`] do, with which it agrees within 5 mm.
     pub fn of(path: &[[DVec2; 4]], kerbs: &Outline) -> UnitClearance {
+        let at_poses: Vec<Near> = path.iter().map(|corners| at_pose(corners, kerbs)).collect();
+        let least = at_poses.iter().map(|near| near.1).fold(f64::INFINITY, f64::min);
         let mut found = UnitClearance { least: f64::INFINITY, at: DVec2::ZERO, overlaps: Vec::new() };
         let mut overlapping = false;
-        for corners in path {
-            let (deepest, mut distance) = nearest(corners, kerbs);
-            // A narrow nose may lie between two points of the outline: the overlap is decided exactly.
-            let overlaps = kerbs.intersects_rectangle(corners);
-            if overlaps && -HIDDEN < distance && kerbs.intersects_rectangle(&within(corners, HIDDEN)) {
-                distance = -HIDDEN;
-            }
+        let mut take = |(at, distance, overlaps): Near| {
             if distance < found.least {
-                (found.least, found.at) = (distance, deepest);
+                (found.least, found.at) = (distance, at);
             }
             if overlaps {
                 let depth = -distance.min(0.0);
                 match found.overlaps.last_mut().filter(|_| overlapping) {
                     Some(section) if depth <= section.1 => {}
-                    Some(section) => *section = (deepest, depth),
-                    None => found.overlaps.push((deepest, depth)),
+                    Some(section) => *section = (at, depth),
+                    None => found.overlaps.push((at, depth)),
                 }
             }
             overlapping = overlaps;
+        };
+        for (index, &near) in at_poses.iter().enumerate() {
+            take(near);
+            let Some(&next) = at_poses.get(index + 1) else { break };
+            let (from, to) = (&path[index], &path[index + 1]);
+            let moved = (0..4).map(|corner| from[corner].distance(to[corner])).fold(0.0, f64::max);
+            // No point moves farther than a corner, and half of that from the nearer pose.
+            if 0.5 * (near.1 + next.1 - moved) < least.max(0.0)
+                && let Some(between) = between(from, to, kerbs)
+                && between.1 < near.1.min(next.1) - NEARER
+            {
+                take((between.0, between.1, between.2 || (near.2 && next.2)));
+            }
         }
         found
     }
+}
+
+/// At a pose.
+fn at_pose(corners: &[DVec2; 4], kerbs: &Outline) -> Near {
+    let (at, mut distance) = nearest(corners, kerbs);
+    if kerbs.intersects_rectangle(corners) {
+        // A narrow nose may lie between two points of the outline: the overlap is decided exactly.
+        if -HIDDEN < distance && kerbs.intersects_rectangle(&within(corners, HIDDEN)) {
+            distance = -HIDDEN;
+        }
+        return (at, distance, true);
+    }
+    let centre = (corners[0] + corners[2]) / 2.0;
+    let nearby = kerbs.near(centre, corners[0].distance(centre));
+    let exact = least((0..4).map(|side| nearby.nearest_of(corners[side], corners[(side + 1) % 4])));
+    if exact.1 < distance - NEARER { (exact.0, exact.1, false) } else { (at, distance, false) }
+}
+
+/// Of the straight paths of the corners from a pose to the next: with the sides at both, they bound what is swept
+/// between. None where nothing moves.
+fn between(from: &[DVec2; 4], to: &[DVec2; 4], kerbs: &Outline) -> Option<Near> {
+    let paths = || (0..4).map(|corner| (from[corner], to[corner])).filter(|(from, to)| from != to);
+    let centre = (from[0] + to[2]) / 2.0;
+    let radius = from.iter().chain(to).map(|corner| corner.distance(centre)).fold(0.0, f64::max);
+    let nearby = kerbs.near(centre, radius);
+    let mut found: Option<Near> = None;
+    for (from, to) in paths() {
+        let crossings = nearby.crossings(from, to);
+        let near = if crossings.is_empty() && 0.0 <= nearby.signed_distance(from) {
+            let (at, distance) = nearby.nearest_of(from, to);
+            (at, distance, false)
+        } else {
+            let n = (from.distance(to) / BETWEEN_CORNERS).ceil();
+            let points = (0..=n as usize).map(|step| from.lerp(to, step as f64 / n));
+            // A narrow nose may lie between two of them.
+            let points = points.chain(crossings.windows(2).map(|pair| pair[0].midpoint(pair[1])));
+            let (at, distance) = least(points.map(|p| (p, nearby.signed_distance(p))));
+            (at, distance.min(0.0), true)
+        };
+        let overlaps = near.2 || found.is_some_and(|found| found.2);
+        found = Some(found.filter(|found| found.1 <= near.1).unwrap_or(near)).map(|(at, by, _)| (at, by, overlaps));
+    }
+    found
+}
+
+/// The point with the least distance.
+fn least(points: impl Iterator<Item = (DVec2, f64)>) -> (DVec2, f64) {
+    points.fold((DVec2::ZERO, f64::INFINITY), |least, here| if here.1 < least.1 { here } else { least })
 }
 
 /// A rectangle with each side moved inwards (m).
@@ -72,9 +137,7 @@ pub fn nearest(corners: &[DVec2; 4], kerbs: &Outline) -> (DVec2, f64) {
         let n = (from.distance(to) / BETWEEN_POINTS).ceil();
         (0..n as usize).map(move |step| from.lerp(to, step as f64 / n))
     });
-    points
-        .map(|p| (p, nearby.signed_distance(p)))
-        .fold((centre, f64::INFINITY), |least, here| if here.1 < least.1 { here } else { least })
+    least(points.map(|p| (p, nearby.signed_distance(p))))
 }
 
 /// The area that a rectangle sweeps from pose to pose as polygons within 5 mm: boundaries counter-clockwise, holes
@@ -160,10 +223,42 @@ mod tests {
         };
         let least = |kerb: &Outline| UnitClearance::of(&[body], kerb).least;
         assert!(0.0 < nearest(&body, &triangle(-1.16)).1, "no point lies in it");
+        // Nor is one as near as the side is.
+        assert!((least(&triangle(-1.21)) - 0.01).abs() < 1e-9 && 0.02 < nearest(&body, &triangle(-1.21)).1);
         assert_eq!(least(&triangle(-1.16)), -HIDDEN);
         assert_eq!(least(&around(Curve::circle(DVec2::ZERO, 0.1))), -HIDDEN);
         // One that just touches has no depth.
         assert!(0.0 < least(&triangle(-1.1995)));
+    }
+
+    #[test]
+    fn a_nose_between_two_poses_of_a_corner_that_swings_is_as_near_as_the_swept_area() {
+        // 9 m long and 2.5 m wide, its rear on a circle of 10 m, poses 0.4 m apart; the outer front corner swings.
+        let pose = |angle: f64| {
+            let (rear, along) = (10.0 * DVec2::from_angle(angle), DVec2::from_angle(angle).perp());
+            [(9.0, 1.25), (0.0, 1.25), (0.0, -1.25), (9.0, -1.25)].map(|(x, y)| rear + x * along - y * along.perp())
+        };
+        let path: Vec<[DVec2; 4]> = (0..12).map(|index| pose(f64::from(index) * 0.04)).collect();
+        let outer = (0..4).max_by(|a, b| path[0][*a].length().total_cmp(&path[0][*b].length())).unwrap();
+        let tip = path[5][outer].midpoint(path[6][outer]);
+        let (out, across) = (tip.normalize(), tip.normalize().perp());
+        let of = |path: &[[DVec2; 4]], by: f64| {
+            let tip = tip + by * out;
+            let corners = [tip, tip + 0.6 * out + 0.12 * across, tip + 0.6 * out - 0.12 * across];
+            let pieces = (0..3).map(|index| Piece::Segment { from: corners[index], to: corners[(index + 1) % 3] });
+            let nose = Curve { pieces: pieces.collect() };
+            UnitClearance::of(path, &Outline::new(vec![Curve::circle(DVec2::ZERO, 50.0), nose]))
+        };
+        for by in [0.3, 0.02, 0.005] {
+            let found = of(&path, by);
+            assert!((found.least - by).abs() < 1e-6 && found.overlaps.is_empty(), "{by}: {found:?}");
+        }
+        let at_poses = of(&path[5..6], 0.005).least.min(of(&path[6..7], 0.005).least);
+        assert!(0.05 < at_poses, "{at_poses}");
+        // It lies within what is swept between two poses alone.
+        let found = of(&path, -0.02);
+        assert!(-0.02 < found.least && found.least < -0.002, "{found:?}");
+        assert!(found.overlaps.len() == 1 && found.at.distance(tip) < 0.01, "{found:?}");
     }
 
     #[test]
