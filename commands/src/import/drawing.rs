@@ -96,7 +96,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
     };
     let named = [("--kerb-layer", &layers.kerbs), ("--lane-layer", &layers.lanes), ("--apron-layer", &layers.aprons)];
     for (index, (flag, layer)) in named.iter().enumerate() {
-        if let Some((other, _)) = named[..index].iter().find(|(_, other)| other.eq_ignore_ascii_case(layer)) {
+        if let Some((other, _)) = named[..index].iter().find(|(_, other)| other.to_lowercase() == layer.to_lowercase())
+        {
             let expected = format!("is that of {other} too: each part is on a layer of its own");
             return Err(Error::Setting { name: flag, value: layer.to_string(), expected });
         }

@@ -90,13 +90,13 @@ impl Drawing {
         let (unit, note) = unit(file, &pairs, layers)?;
         check_whole(file, &pairs)?;
         let entities = section(&pairs, "ENTITIES");
-        let blocks = drawn_blocks(&pairs, layers);
+        let (blocks, unseen_layers) = (drawn_blocks(&pairs, layers), unseen_layers(&pairs));
         let reader = Reader::of(file);
         reader.count("entities", entities.len(), 0..=MOST_ENTITIES)?;
         let mut drawing = Drawing { notes: note.into_iter().collect(), ..Drawing::default() };
         let mut others: BTreeMap<&str, usize> = BTreeMap::new();
         let mut without_outline: Vec<&str> = Vec::new();
-        let mut on_paper = 0;
+        let (mut on_paper, mut unseen) = (0, 0);
         let mut index = 0;
         while index < entities.len() {
             let entity = entities[index];
@@ -112,17 +112,20 @@ impl Drawing {
                 continue;
             }
             let layer = text_of(entity, 8).unwrap_or_default();
-            let drawn_name = |name: &&str| entity[0].value == "INSERT" && blocks.contains(&folded(name));
+            let is_unseen = text_of(entity, 60) == Some("1") || unseen_layers.contains(&folded(layer));
+            let is_insert = entity[0].value == "INSERT" && !is_unseen;
+            let drawn_name = |name: &&str| is_insert && blocks.contains(&folded(name));
             if let Some(name) = text_of(entity, 2).filter(drawn_name) {
                 let found = format!("INSERT of {name}");
                 let place = format!("line {}", entity[0].line);
                 return Err(reader.invalid(place, found, "kerbs, lanes or aprons lie in this block: explode it"));
             }
-            let target = if layer.eq_ignore_ascii_case(&layers.kerbs) {
+            let is = |name: &str| folded(layer) == folded(name);
+            let target = if is(&layers.kerbs) {
                 &mut drawing.kerbs
-            } else if layer.eq_ignore_ascii_case(&layers.lanes) {
+            } else if is(&layers.lanes) {
                 &mut drawing.lanes
-            } else if layer.eq_ignore_ascii_case(&layers.aprons) {
+            } else if is(&layers.aprons) {
                 &mut drawing.aprons
             } else {
                 if !matches!(entity[0].value, "VERTEX" | "SEQEND") {
@@ -130,11 +133,19 @@ impl Drawing {
                 }
                 continue;
             };
+            if is_unseen {
+                unseen += usize::from(entity[0].value != "SEQEND");
+                continue;
+            }
             match curve(file, entity, vertices, unit.metres())? {
                 Some(drawn) => target.push(drawn),
                 None if entity[0].value == "SEQEND" => {}
                 None => without_outline.push(entity[0].value),
             }
+        }
+        if 0 < unseen {
+            let what = "entities on these layers that are invisible, or whose layer is off or frozen, are left out";
+            drawing.notes.push(format!("{unseen} {what}"));
         }
         for (layer, kind) in [(&layers.kerbs, &drawing.kerbs), (&layers.lanes, &drawing.lanes)] {
             if kind.is_empty() {
@@ -144,7 +155,12 @@ impl Drawing {
                 let others = others.iter().map(|(layer, n)| (*layer, *n));
                 let known: Vec<String> = own.chain(others).map(|(layer, n)| format!("{layer} ({n})")).collect();
                 let has = if known.is_empty() { "nothing".into() } else { known.join(", ") };
-                return Err(reader.invalid(format!("layer {layer}"), "empty", format!("the drawing has {has}")));
+                let hidden = if 0 < unseen { ", and what is off, frozen or invisible: show it" } else { "" };
+                return Err(reader.invalid(
+                    format!("layer {layer}"),
+                    "empty",
+                    format!("the drawing has {has}{hidden}"),
+                ));
             }
         }
         reach(&reader, &drawing.kerbs)?;
@@ -166,7 +182,7 @@ impl Drawing {
 }
 
 /// A drawing of a roundabout reaches over tens or hundreds of metres; one whose unit is not what it says does not.
-fn reach(reader: &Reader, kerbs: &[Entity]) -> Result<(), Error> {
+pub(super) fn reach(reader: &Reader, kerbs: &[Entity]) -> Result<(), Error> {
     // A circle ends where it begins.
     let along = |piece: &Piece| [0.0, 0.25, 0.5, 0.75, 1.0].map(|part| piece.point_at(part * piece.length()));
     let ends = kerbs.iter().flat_map(|kerb| kerb.curve.pieces.iter().flat_map(along));
@@ -232,8 +248,19 @@ fn section<'a, 'b>(pairs: &'b [Pair<'a>], name: &str) -> Vec<&'b [Pair<'a>]> {
     starts.iter().zip(ends).map(|(&start, end)| &section[start..end]).collect()
 }
 
-/// A name in a DXF, which is the same in capitals.
-fn folded(name: &str) -> String {
+/// Names of the layers that are switched off or frozen, all [`folded`].
+fn unseen_layers(pairs: &[Pair]) -> HashSet<String> {
+    let whole = |entity: &[Pair], code: i32| text_of(entity, code).and_then(|text| text.parse::<i32>().ok());
+    let is_unseen = |entity: &[Pair]| {
+        // The colour of a layer that is off is negative; bit 1 of its flags freezes it.
+        whole(entity, 62).is_some_and(|colour| colour < 0) || whole(entity, 70).is_some_and(|flags| flags & 1 == 1)
+    };
+    let layers = section(pairs, "TABLES").into_iter().filter(|entity| entity[0].value == "LAYER" && is_unseen(entity));
+    layers.filter_map(|entity| text_of(entity, 2)).map(folded).collect()
+}
+
+/// A name in a drawing, which is the same in capitals.
+pub(super) fn folded(name: &str) -> String {
     name.to_lowercase()
 }
 
@@ -246,7 +273,7 @@ fn drawn_blocks(pairs: &[Pair], layers: &Layers) -> HashSet<String> {
     let name_of = |entity: &[Pair]| folded(text_of(entity, 2).unwrap_or_default());
     for entity in section(pairs, "BLOCKS") {
         let layer = text_of(entity, 8).unwrap_or_default();
-        let is_drawn = [&layers.kerbs, &layers.lanes, &layers.aprons].iter().any(|one| layer.eq_ignore_ascii_case(one));
+        let is_drawn = [&layers.kerbs, &layers.lanes, &layers.aprons].iter().any(|one| folded(layer) == folded(one));
         match entity[0].value {
             "BLOCK" => block = name_of(entity),
             // What stands on layer 0 of a block takes the layer of the insertion.

@@ -1,6 +1,7 @@
 //! Drawings as other programs write them, and drawings that are refused.
 
 mod parts;
+mod unseen;
 
 use std::fmt::Write;
 use std::path::Path;

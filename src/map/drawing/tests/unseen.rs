@@ -1,0 +1,41 @@
+//! What is drawn and not seen, names of layers, degrees, and ends of arms.
+
+use super::*;
+
+/// A circle on a layer, with further pairs of a code and a value.
+fn circle(layer: &str, pairs: &str) -> String {
+    format!("0\nCIRCLE\n8\n{layer}\n{pairs}10\n{}\n20\n{}\n40\n1\n", AT.x + 60.0, AT.y + 60.0)
+}
+
+/// The drawing with a table of layers, each with its pairs of a code and a value.
+fn with_layers(entities: &str, layers: &[(&str, &str)]) -> String {
+    let layer = |(name, pairs): &(&str, &str)| format!("0\nLAYER\n2\n{name}\n{pairs}");
+    let table: String = layers.iter().map(layer).collect();
+    let table = format!("0\nSECTION\n2\nTABLES\n0\nTABLE\n2\nLAYER\n70\n9\n{table}0\nENDTAB\n0\nENDSEC\n");
+    HEADER.replace("0\nSECTION\n2\nENTITIES\n", &format!("{table}0\nSECTION\n2\nENTITIES\n")) + entities + END
+}
+
+#[test]
+fn what_is_invisible_or_on_a_layer_that_is_off_or_frozen_is_left_out_and_said() {
+    let road = drawn(&Road::named("16m").unwrap(), 1.0);
+    let whole = read(&road, &layers()).unwrap();
+    assert_eq!(read(&(road.clone() + &circle("KERB", "")), &layers()).unwrap().ground.faces.loops.len(), 7);
+    let Drawn { ground, notes } = read(&(road.clone() + &circle("KERB", "60\n1\n")), &layers()).unwrap();
+    assert_eq!(ground.faces.loops.len(), whole.ground.faces.loops.len());
+    let said = "entities on these layers that are invisible, or whose layer is off or frozen, are left out";
+    assert_eq!(notes, [format!("1 {said}")]);
+    let aprons = road.clone() + &circle("Apron", "");
+    let parsed = |text: &str| parse(Path::new("site.dxf"), text, &layers()).map_err(|error| error.to_string());
+    assert!(parsed(&with_layers(&aprons, &[("APRON", "70\n0\n62\n7\n")])).unwrap_err().contains("APRON"));
+    for pairs in ["70\n0\n62\n-7\n", "70\n1\n62\n7\n", "70\n5\n62\n7\n"] {
+        assert_eq!(parsed(&with_layers(&aprons, &[("APRON", pairs)])).unwrap().notes, [format!("1 {said}")]);
+    }
+    let refused = parsed(&with_layers(&road, &[("KERB", "70\n1\n62\n7\n")])).unwrap_err();
+    assert!(refused.contains("layer KERB: empty") && refused.contains("off, frozen or invisible"), "{refused}");
+}
+
+#[test]
+fn names_of_layers_are_the_same_in_capitals_whatever_their_letters() {
+    let road = drawn(&Road::named("16m").unwrap(), 1.0).replace("KERB", "BORD\u{dc}RE");
+    assert!(read(&road, &Layers { kerbs: "Bord\u{fc}re".into(), ..layers() }).is_ok());
+}
