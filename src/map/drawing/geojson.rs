@@ -9,6 +9,7 @@ use glam::DVec2;
 use serde::Deserialize;
 use serde_json::Value;
 
+use super::dxf::{folded, reach};
 use super::{Drawing, Entity, Layers, Unit};
 use crate::files::reader::{Error, Reader, shortened};
 use crate::geometry::area::densified;
@@ -23,7 +24,7 @@ const MOST_FEATURES: usize = 1_000_000;
 const MOST_POINTS: usize = 100_000;
 /// Largest coordinate (m).
 const FARTHEST: f64 = 1e8;
-/// Kerbs that reach over less than this are in degrees: the smallest ring is wider (m).
+/// Kerbs whose coordinates reach over less than this are in degrees: the smallest ring is wider.
 const SMALLEST: f64 = 0.5;
 /// Arcs and segments take the place of a kerb's points within this (m).
 const FITTED: f64 = 1e-3;
@@ -93,6 +94,7 @@ pub(super) fn drawing(file: &Path, text: &str, layers: &Layers) -> Result<Drawin
         return Err(reader.invalid("type", format!("{kind:?}"), "must be \"FeatureCollection\""));
     }
     reader.count("features", collection.features.len(), 1..=MOST_FEATURES)?;
+    check_extent(&reader, &collection.features, layers)?;
     let mut drawing = Drawing::default();
     let frame = frame(&reader, collection.crs.as_ref())?;
     let taken = if layers.unit.is_none() { ", and are taken for metres" } else { "" };
@@ -102,7 +104,7 @@ pub(super) fn drawing(file: &Path, text: &str, layers: &Layers) -> Result<Drawin
     let mut left = LONGEST;
     for (index, feature) in collection.features.iter().enumerate() {
         let (part, place) = (feature.part(), format!("feature {}", index + 1));
-        let is = |layer: &str| part.eq_ignore_ascii_case(layer);
+        let is = |layer: &str| folded(part) == folded(layer);
         let Some(geometry) = &feature.geometry else {
             drawing.notes.push(format!("{place} has no geometry and is left out"));
             continue;
@@ -137,7 +139,7 @@ pub(super) fn drawing(file: &Path, text: &str, layers: &Layers) -> Result<Drawin
             return Err(reader.invalid(format!("part {layer}"), "none", expected));
         }
     }
-    check_extent(&reader, &drawing.kerbs)?;
+    reach(&reader, &drawing.kerbs)?;
     let left_out: usize = others.values().sum();
     if 0 < left_out {
         drawing.notes.push(format!("{left_out} features of {} other parts are left out", others.len()));
@@ -169,15 +171,32 @@ const MERCATOR: [&str; 6] = ["3857", "3395", "3785", "900913", "102100", "102113
 const PROJECT: &str = "coordinates must be metres, not degrees: project them, as by ogr2ogr -t_srs EPSG:25832 \
                        site.geojson degrees.geojson";
 
-/// An error if the kerbs are as small as they are in degrees.
-fn check_extent(reader: &Reader, kerbs: &[Entity]) -> Result<(), Error> {
-    let points = kerbs.iter().flat_map(|kerb| kerb.curve.pieces.iter().map(Piece::start));
-    let (low, high) = points.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
-    let extent = high - low;
-    if SMALLEST <= extent.max_element() {
+/// An error if the kerbs' coordinates are as near to each other as they are in degrees, on either side of 180 deg too.
+fn check_extent(reader: &Reader, features: &[Feature], layers: &Layers) -> Result<(), Error> {
+    let mut positions = Vec::new();
+    let kerbs = features.iter().filter(|feature| folded(feature.part()) == folded(&layers.kerbs));
+    kerbs.filter_map(|kerb| kerb.geometry.as_ref()).for_each(|one| collect_positions(&one.coordinates, &mut positions));
+    let on_earth = |p: &DVec2| p.x.abs() <= 180.0 && p.y.abs() <= 90.0;
+    let extent = |place: fn(&DVec2) -> DVec2| {
+        let ends = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+        let (low, high) = positions.iter().map(place).fold(ends, |(low, high), p| (low.min(p), high.max(p)));
+        high - low
+    };
+    let (own, around) = (extent(|p| *p), extent(|p| DVec2::new(p.x.rem_euclid(360.0), p.y)));
+    let extent = if own.x <= around.x { own } else { around };
+    if positions.is_empty() || !positions.iter().all(on_earth) || SMALLEST <= extent.max_element() {
         return Ok(());
     }
     Err(reader.invalid("kerbs", format!("reach over {:.6} by {:.6}", extent.x, extent.y), PROJECT))
+}
+
+/// The positions at any depth of a geometry's coordinates.
+fn collect_positions(value: &Value, positions: &mut Vec<DVec2>) {
+    let number = |axis: usize| value.get(axis).and_then(Value::as_f64);
+    match (number(0), number(1)) {
+        (Some(x), Some(y)) => positions.push(DVec2::new(x, y)),
+        _ => value.as_array().into_iter().flatten().for_each(|part| collect_positions(part, positions)),
+    }
 }
 
 /// The geometry of a feature.

@@ -39,3 +39,22 @@ fn names_of_layers_are_the_same_in_capitals_whatever_their_letters() {
     let road = drawn(&Road::named("16m").unwrap(), 1.0).replace("KERB", "BORD\u{dc}RE");
     assert!(read(&road, &Layers { kerbs: "Bord\u{fc}re".into(), ..layers() }).is_ok());
 }
+
+#[test]
+fn kerbs_in_degrees_are_told_by_their_coordinates_on_either_side_of_the_meridian_of_180_degrees() {
+    let refused = |west: f64, unit: Option<Unit>| {
+        let ring = [(0.0, 0.0), (0.002, 0.0), (0.002, 0.001), (0.0, 0.001), (0.0, 0.0)].map(|(x, y)| {
+            let x: f64 = west + x;
+            [if 180.0 < x { x - 360.0 } else { x }, -17.0 + y]
+        });
+        let geometry = serde_json::json!({"type": "Polygon", "coordinates": [ring]});
+        let kerb = serde_json::json!({"type": "Feature", "properties": {"part": "KERB"}, "geometry": geometry});
+        let text = serde_json::json!({"type": "FeatureCollection", "features": [kerb]}).to_string();
+        parse(Path::new("site.geojson"), &text, &Layers { unit, ..layers() }).unwrap_err().to_string()
+    };
+    for (west, unit) in [(179.999, None), (12.0, None), (179.999, Some(Unit::Foot))] {
+        let said = refused(west, unit);
+        let expected = "kerbs: reach over 0.002000 by 0.001000; coordinates must be metres, not degrees";
+        assert!(said.contains(expected), "{west}: {said}");
+    }
+}
