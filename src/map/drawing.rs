@@ -8,6 +8,7 @@ mod dxf; // polylines, lines and arcs on their layers
 mod pairs; // group codes and values
 mod geojson; // polygons and lines by a property
 mod site; // what is drawn, as a road
+mod ways; // their lines, joined
 mod aprons; // their edges among the kerbs
 #[cfg(test)]
 mod tests;

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use glam::DVec2;
 
-use super::{Drawing, Entity, Layers, aprons};
+use super::{Drawing, Entity, Layers, aprons, ways};
 use crate::files::reader::{Error, Reader};
 use crate::geometry::area::densified;
 use crate::geometry::{Curve, Outline, Piece, fitted_line, wrapped};
@@ -54,8 +54,8 @@ pub(super) fn drawn(file: &Path, drawing: Drawing, layers: &Layers) -> Result<Dr
     reader.count(&format!("lines on layer {}", layers.kerbs), kerbs.len(), 1..=MOST_KERBS)?;
     reader.count(&format!("lines on layer {}", layers.lanes), lanes.len(), 1..=MOST_WAYS)?;
     reader.count(&format!("lines on layer {}", layers.aprons), aprons.len(), 0..=MOST_APRONS)?;
-    lead_arcs(&mut lanes);
-    let lanes = whole(lanes, &layers.lanes, &mut notes);
+    ways::lead_arcs(&mut lanes);
+    let lanes = ways::whole(lanes, &layers.lanes, &mut notes);
     let loops = closed(&reader, kerbs, &layers.kerbs, &mut notes)?;
     let aprons = closed(&reader, aprons, &layers.aprons, &mut notes)?;
     let (loops, aprons) = aprons::placed(loops, aprons);
@@ -103,6 +103,7 @@ pub(super) fn drawn(file: &Path, drawing: Drawing, layers: &Layers) -> Result<Dr
         };
         notes.push(format!("no way {missing} on arm {}: ends more than 20 deg apart are of two arms", arm.name));
     }
+    notes.extend(ways::too_short(&lines, &arms, outer));
     lines.sort_by_key(|line| (line.entry, line.lane == Lane::Right, line.exit));
     let mut lane_radii: Vec<f64> =
         lines.iter().map(|line| ring_radius(&line.line.polyline(0.01), radius, outer)).collect();
@@ -206,55 +207,6 @@ fn crosses_itself(curve: &Curve) -> Option<DVec2> {
         beside.filter(|&&b| is_near(a, b)).find_map(|&b| crossing((a, b)))
     };
     order.iter().enumerate().find_map(of_one)
-}
-
-/// Reverses arcs that lead against what they meet.
-fn lead_arcs(drawn: &mut [Entity]) {
-    let ends = |one: &Entity| [one.curve.point_at(0.0), one.curve.point_at(one.curve.length())];
-    let mut is_settled: Vec<bool> = drawn.iter().map(|one| !one.is_arc).collect();
-    loop {
-        let met = |arc: usize| {
-            let [begins, stops] = ends(&drawn[arc]);
-            // Whether something whose direction is known has its beginning (0) or its end (1) there.
-            let meets = |p: DVec2, end: usize| {
-                let settled = drawn.iter().zip(&is_settled).filter(|(_, is_settled)| **is_settled);
-                settled.map(|(one, _)| ends(one)[end]).any(|other| other.distance(p) <= GAP)
-            };
-            let follows = meets(begins, 1) || meets(stops, 0);
-            let opposes = meets(stops, 1) || meets(begins, 0);
-            (follows || opposes).then_some((arc, !follows))
-        };
-        let Some((arc, is_reversed)) = (0..drawn.len()).filter(|&arc| !is_settled[arc]).find_map(met) else { break };
-        if is_reversed {
-            drawn[arc].curve = drawn[arc].curve.reversed();
-        }
-        is_settled[arc] = true;
-    }
-}
-
-/// Ways, of which those that are drawn in parts are one each: an end at which one other begins, and nothing else meets.
-fn whole(mut drawn: Vec<Entity>, layer: &str, notes: &mut Vec<String>) -> Vec<Entity> {
-    let start = |one: &Entity| one.curve.point_at(0.0);
-    let end = |one: &Entity| one.curve.point_at(one.curve.length());
-    let n = drawn.len();
-    loop {
-        let follows = |from: usize, to: usize| from != to && end(&drawn[from]).distance(start(&drawn[to])) <= GAP;
-        let all = || 0..drawn.len();
-        let only = |from: usize, to: usize| {
-            let ends = all().filter(|&other| follows(other, to)).count();
-            let starts = all().filter(|&other| follows(from, other)).count();
-            (ends, starts) == (1, 1) && !follows(to, from)
-        };
-        let joint = all().flat_map(|from| all().map(move |to| (from, to)));
-        let Some((from, to)) = joint.into_iter().find(|&(from, to)| follows(from, to) && only(from, to)) else { break };
-        let pieces = drawn[to].curve.pieces.clone();
-        drawn[from].curve.pieces.extend(pieces);
-        drawn.remove(to);
-    }
-    if drawn.len() < n {
-        notes.push(format!("{n} lines on layer {layer} are joined to {} ways", drawn.len()));
-    }
-    drawn
 }
 
 /// The centre and the radius of the central island.

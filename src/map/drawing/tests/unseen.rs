@@ -58,3 +58,21 @@ fn kerbs_in_degrees_are_told_by_their_coordinates_on_either_side_of_the_meridian
         assert!(said.contains(expected), "{west}: {said}");
     }
 }
+
+#[test]
+fn an_arm_whose_lines_end_near_the_ring_is_noted() {
+    let road = Road::named("16m").unwrap();
+    let ground = road.ground();
+    let outer = read(&drawn(&road, 1.0), &layers()).unwrap().ground.outer_radius;
+    let short = |line: &crate::map::ground::Line| {
+        let length = line.line.length();
+        let near = (0..10_000).map(|step| f64::from(step) * 0.01);
+        let from = near.take_while(|&s| outer + 5.0 < line.line.point_at(s).length()).last().unwrap_or(0.0);
+        polyline("LANE", &line.line.part(if line.entry == 0 { from } else { 0.0 }, length), false, 1.0)
+    };
+    let kerbs = ground.faces.loops.iter().map(|curve| polyline("KERB", curve, true, 1.0));
+    let Drawn { notes, .. } =
+        read(&kerbs.chain(ground.lines.iter().map(short)).collect::<String>(), &layers()).unwrap();
+    let name = &ground.arms[0].name;
+    assert_eq!(notes, [format!("arm {name}: its lines end 5 m from the ring; trucks need 23 m or more")]);
+}
