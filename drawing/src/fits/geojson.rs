@@ -42,7 +42,7 @@ pub fn geojson(road: &Road, gutter: Gutter, shown: &[&Shown], crs: Option<&str>)
         features.push(feature(
             json!({"part": "kerb", "of": of}),
             "Polygon",
-            json!([frame.ring(&curve.polygon(CHORD))]),
+            json!([frame.ring(&counter_clockwise(curve.polygon(CHORD)))]),
         ));
     }
     for apron in road.aprons() {
@@ -154,6 +154,14 @@ impl Frame {
     }
 }
 
+/// A polygon as an exterior ring of RFC 7946 runs, an island's too.
+fn counter_clockwise(mut ring: Vec<DVec2>) -> Vec<DVec2> {
+    if signed_area(&ring) < 0.0 {
+        ring.reverse();
+    }
+    ring
+}
+
 /// The area of a polygon, positive counter-clockwise (m²).
 fn signed_area(ring: &[DVec2]) -> f64 {
     let n = ring.len();
@@ -221,6 +229,9 @@ mod tests {
         let kerbs = features.iter().filter(|feature| feature["properties"]["part"] == "kerb");
         for ring in kerbs.map(|kerb| kerb["geometry"]["coordinates"][0].as_array().unwrap()) {
             assert!(3 < ring.len() && ring[0] == ring[ring.len() - 1]);
+            let of = |p: &Value| DVec2::new(p[0].as_f64().unwrap(), p[1].as_f64().unwrap());
+            let points: Vec<DVec2> = ring[1..].iter().map(of).collect();
+            assert!(0.0 < signed_area(&points), "an exterior ring is counter-clockwise");
         }
         let of: Vec<&str> = features.iter().filter_map(|feature| feature["properties"]["of"].as_str()).collect();
         assert!(of.starts_with(&["outer", "island"]) && of[2].starts_with("splitter "), "{of:?}");
