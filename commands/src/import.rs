@@ -130,6 +130,7 @@ struct Written<'a> {
     hand: &'static str,
     /// Radius of the central island; none at a junction (m).
     island_radius: Option<f64>,
+    /// In the order in which `--arms` takes names.
     arms: Vec<&'a str>,
     routes: Vec<String>,
     warnings: &'a [String],
@@ -145,7 +146,7 @@ impl Written<'_> {
             origin: [centre.x, centre.y],
             hand: if ground.mirrored { "left" } else { "right" },
             island_radius: (0.0 < ground.island_radius).then_some(ground.island_radius),
-            arms: (0..ground.arms.len()).map(arm).collect(),
+            arms: imported.arm_names(),
             routes: ground.lines.iter().map(route).collect(),
             warnings,
         }
@@ -256,9 +257,9 @@ fn list(file: &Path, map: &Map) -> Result<(), Error> {
         let _ =
             write!(text, "ring {x:.1},{y:.1}: island {:.2} m, within {:.2} m of a circle", ring.radius, ring.residual);
         match map.ground(&ring, &Options::default()) {
-            Ok(Imported { ground, .. }) => {
-                let arms: Vec<&str> = ground.arms.iter().map(|arm| arm.name.as_str()).collect();
-                let _ = writeln!(text, "; arms {}; {} routes", arms.join(" "), ground.lines.len());
+            Ok(imported) => {
+                let (arms, routes) = (imported.arm_names().join(" "), imported.ground.lines.len());
+                let _ = writeln!(text, "; arms {arms}; {routes} routes");
                 drivable += 1;
             }
             Err(error) => {
@@ -362,5 +363,8 @@ mod tests {
         assert_eq!(left["origin"], serde_json::json!([3.0, -4.0]));
         let name = |said: &serde_json::Value| said["routes"][0].as_str().unwrap().to_owned();
         assert!(name(&right).contains("-left-") && name(&left).contains("-right-"), "{left}");
+        // Counter-clockwise from east in the map, as `--arms` takes them.
+        let arms = |names: [&str; 4]| serde_json::json!(names);
+        assert_eq!((&right["arms"], &left["arms"]), (&arms(["E", "N", "W", "SW"]), &arms(["E", "SW", "W", "N"])));
     }
 }

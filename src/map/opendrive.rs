@@ -46,7 +46,7 @@ use graph::Graph;
 pub use junction::{Junction, RoadLane, Way};
 use lanes::Strip;
 pub(in crate::map) use lines::closest;
-pub(in crate::map) use names::named;
+pub(in crate::map) use names::{from_east, named};
 use records::Records;
 pub(in crate::map) use rings::fitted_circle;
 pub use rings::{Refused, Ring};

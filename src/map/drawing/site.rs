@@ -12,7 +12,7 @@ use crate::geometry::{Curve, Outline, Piece, fitted_line, wrapped};
 use crate::map::apron;
 use crate::map::chosen::FARTHEST;
 use crate::map::ground::{Arm, Edges, Ground, Kerb, Line};
-use crate::map::opendrive::{closest, fitted_circle, kerb_of, named, outer_radius, ring_radius};
+use crate::map::opendrive::{closest, fitted_circle, from_east, kerb_of, named, outer_radius, ring_radius};
 use crate::map::route::Lane;
 
 /// Ends of lines nearer than this are joined (m).
@@ -299,7 +299,7 @@ fn arms(reader: &Reader, ways: &[Curve], layers: &Layers, mirrored: bool) -> Res
             (bearings[first] + 0.5 * span).rem_euclid(TAU)
         })
         .collect();
-    middles.sort_by(f64::total_cmp);
+    middles.sort_by(|one, other| from_east(*one).total_cmp(&from_east(*other)));
     named(&middles, &layers.arms, mirrored)
         .map_err(|expected| reader.invalid("arms", format!("{:?}", layers.arms), expected))
 }

@@ -103,7 +103,8 @@ impl Ground {
             list(&self.lane_radii)
         );
         for Arm { name, bearing } in &self.arms {
-            let _ = writeln!(text, "\n[[arm]]\nname = {name:?}\nbearing_deg = {}", number(bearing.to_degrees(), 3));
+            let degrees = (bearing.to_degrees() * 1e3).round() / 1e3 % 360.0;
+            let _ = writeln!(text, "\n[[arm]]\nname = {name:?}\nbearing_deg = {}", number(degrees, 3));
         }
         let edges = self.edge_loops();
         let edge_kerbs = self.edge_kerbs(&edges);

@@ -2,17 +2,42 @@
 
 use std::f64::consts::{PI, TAU};
 
+use super::build::Imported;
 use crate::map::ground::Arm;
+
+/// A bearing as the road is seen: in the mirror image of a map its arms follow each other clockwise (rad).
+fn in_map(bearing: f64, mirrored: bool) -> f64 {
+    if mirrored { (-bearing).rem_euclid(TAU) } else { bearing.rem_euclid(TAU) }
+}
+
+/// A bearing counted from where east begins, so that one just below 360 deg comes first (rad).
+pub(in crate::map) fn from_east(bearing: f64) -> f64 {
+    (bearing + PI / 8.0).rem_euclid(TAU)
+}
+
+/// Indices of the arms at these bearings (rad), counter-clockwise from east as the road is seen.
+fn order(bearings: &[f64], mirrored: bool) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..bearings.len()).collect();
+    let place = |arm: &usize| from_east(in_map(bearings[*arm], mirrored));
+    order.sort_by(|one, other| place(one).total_cmp(&place(other)));
+    order
+}
+
+impl Imported {
+    /// Names of its arms in the order in which they are given: counter-clockwise from east as the road is seen.
+    pub fn arm_names(&self) -> Vec<&str> {
+        let arms = &self.ground.arms;
+        let bearings: Vec<f64> = arms.iter().map(|arm| arm.bearing).collect();
+        order(&bearings, self.ground.mirrored).into_iter().map(|arm| arms[arm].name.as_str()).collect()
+    }
+}
 
 /// The arms at these bearings (rad) with their names, or what is wrong with those that are given, which follow each
 /// other counter-clockwise from east as the road is seen; none is given where they are to be found.
 pub(in crate::map) fn named(bearings: &[f64], given: &[String], mirrored: bool) -> Result<Vec<Arm>, String> {
     let bearings: Vec<f64> = bearings.iter().map(|bearing| bearing.rem_euclid(TAU)).collect();
-    // In the mirror image of a map its arms follow each other clockwise.
-    let in_map = |bearing: f64| if mirrored { (-bearing).rem_euclid(TAU) } else { bearing };
-    let mut order: Vec<usize> = (0..bearings.len()).collect();
-    let from_east = |&arm: &usize| (in_map(bearings[arm]) + PI / 8.0).rem_euclid(TAU);
-    order.sort_by(|one, other| from_east(one).total_cmp(&from_east(other)));
+    let in_map = |bearing: f64| in_map(bearing, mirrored);
+    let order = order(&bearings, mirrored);
     let mut names = given.to_vec();
     if given.len() == bearings.len() {
         order.iter().zip(given).for_each(|(&arm, name)| names[arm].clone_from(name));

@@ -60,6 +60,22 @@ fn kerbs_in_degrees_are_told_by_their_coordinates_on_either_side_of_the_meridian
 }
 
 #[test]
+fn an_arm_just_below_360_degrees_comes_first_and_is_written_as_0() {
+    let road = Road::named("16m").unwrap();
+    let turn = |by: f64| {
+        let faces = road.ground().faces.loops.iter().map(move |curve| polyline("KERB", &curve.turned(by), true, 1.0));
+        let lines = road.ground().lines.iter().map(move |line| polyline("LANE", &line.line.turned(by), false, 1.0));
+        read(&faces.chain(lines).collect::<String>(), &layers()).unwrap().ground
+    };
+    let east = turn(0.0).arms.iter().find(|arm| arm.name == "E").unwrap().bearing;
+    for by in [-0.001, 0.0, 0.001] {
+        assert_eq!(turn(by - east).arms[0].name, "E", "{by}");
+    }
+    let text = turn(-1e-7 - east).text(&[]);
+    assert!(text.contains("bearing_deg = 0.0\n") && !text.contains("360.0"), "{text}");
+}
+
+#[test]
 fn an_arm_whose_lines_end_near_the_ring_is_noted() {
     let road = Road::named("16m").unwrap();
     let ground = road.ground();
