@@ -5,6 +5,7 @@
 
 pub mod case; // one vehicle on one road
 pub mod results; // the file, which a later call continues
+mod search; // the way of a route
 pub mod row; // the figures of a route and a vehicle
 pub mod table; // rows as text and as CSV
 pub mod way; // the figures of a path

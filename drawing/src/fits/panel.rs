@@ -4,7 +4,7 @@ use glam::DVec2;
 use offtrack::map::route::Route;
 use offtrack::vehicle::swept::{front_path, swept_area};
 use offtrack_evaluation::fits::table::Units;
-use offtrack_evaluation::fits::{Path as Driven, Row};
+use offtrack_evaluation::fits::{Path as Driven, Row, Way};
 use svg::node::element::{Circle, Group, Path, Use};
 
 use super::letters::Letters;
@@ -93,7 +93,7 @@ impl Shown {
         let colour =
             if self.row.shown().fits || head.clearance <= nearest.clearance { colour::INK } else { colour::OVERLAP };
         let ring = Circle::new().set("cx", number(at.x)).set("cy", number(at.y)).set("r", 6).set("fill", "none");
-        let words = format!("{unit} {}", said(head.units, nearest.clearance));
+        let words = format!("{unit} {}", clearance(head.units, self.row.shown()));
         let is_east = view.low.x + view.high.x < 2.0 * place.x;
         let (aside, align) = if is_east { (-9.0, Align::Right) } else { (9.0, Align::Left) };
         let corner = at + DVec2::new(aside, 4.0);
@@ -105,7 +105,7 @@ impl Shown {
     /// The two lines below the panel.
     pub(super) fn caption(&self, units: Units) -> [String; 2] {
         let Row { vehicle, lane_centre, way, .. } = &self.row;
-        let found = way.as_ref().map_or("none found".to_owned(), |way| said(units, way.clearance()));
+        let found = way.as_ref().map_or("none found".to_owned(), |way| clearance(units, way));
         let shown = self.row.shown();
         let apron = match shown.apron_use() {
             Some(0.0) => ", apron not used".to_owned(),
@@ -113,12 +113,16 @@ impl Shown {
             None => String::new(),
         };
         let verdict = self.row.verdict();
-        let verdict = if self.row.fits { format!("fits, {verdict}") } else { verdict.to_owned() };
+        let verdict = match self.row.limit() {
+            Some(limit) => format!("{verdict}, {}", limit.name()),
+            None if self.row.fits => format!("fits, {verdict}"),
+            None => verdict.to_owned(),
+        };
         [
             format!("{}  {vehicle}: {verdict}", self.row.movement()),
             format!(
                 "centre line {}, other way {found}; swept {}, off-tracking {}, steer {:.0}\u{b0}{apron}",
-                said(units, lane_centre.clearance()),
+                clearance(units, lane_centre),
                 said(units, shown.swept_width),
                 said(units, shown.off_tracking),
                 shown.steer_angle_deg
@@ -156,7 +160,15 @@ fn distance(p: DVec2, from: DVec2, to: DVec2) -> f64 {
 
 /// A length with its unit and a typographic minus sign (m).
 pub(super) fn said(units: Units, length: f64) -> String {
-    format!("{} {}", units.length(length).replace('-', "\u{2212}"), units.of_length())
+    with_unit(units, &units.length(length))
+}
+
+fn clearance(units: Units, way: &Way) -> String {
+    with_unit(units, &units.clearance(way))
+}
+
+fn with_unit(units: Units, number: &str) -> String {
+    format!("{} {}", number.replace('-', "\u{2212}"), units.of_length())
 }
 
 #[cfg(test)]

@@ -15,7 +15,8 @@ use offtrack::world::World;
 
 use super::results::Asked;
 use super::row::Row;
-use super::way::{Asks, Path, Way};
+use super::search::grown;
+use super::way::{Asks, Path, Refusal, Way};
 use crate::certificate::attempt::{attempts, passes};
 use crate::certificate::beam::Pass;
 use crate::certificate::file::{self, Found};
@@ -34,10 +35,6 @@ const STEER_LEVELS: [f64; 9] = [-1.0, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 
 const SHORTEST: f64 = 10.0;
 /// The fastest speed that is looked for (m/s).
 const FASTEST: f64 = 90.0 / 3.6;
-/// By how much a way may come nearer to a kerb than is asked for: positions of the simulator are f32 (m).
-const SLACK: f64 = 1e-3;
-/// How far a truck sees in a search, which observes nothing: rays to the usual range take half of its time (m).
-const UNSEEN: f32 = 0.01;
 /// The benchmark whose reward and sensors stand for those that no search asks for.
 const BASE: &str = "attard2023-full";
 
@@ -53,8 +50,8 @@ pub struct Case {
     pub kerbs: UnitKerbs,
     /// Lengths of the routes before and after the ring (m).
     pub straights: [f64; 2],
-    asked: Asked,
-    world: Arc<World>,
+    pub(super) asked: Asked,
+    pub(super) world: Arc<World>,
     /// The same with the truck's outline grown by the clearance asked for, and without sensors.
     grown: Arc<World>,
     /// The truck with its roll discretised for the time from one pose to the next.
@@ -88,12 +85,6 @@ impl Case {
 
     /// The vehicle on the road of [`Case::scenario`], which `world` was baked from.
     pub fn new(asked: &Asked, name: &str, scenario: &Scenario, world: Arc<World>) -> Case {
-        let mut grown = World::clone(&world);
-        grown.params.sensor_range = UNSEEN;
-        let by = asked.clearance as f32;
-        for body in grown.rigs.iter_mut().flat_map(|rig| [&mut rig.tractor_body, &mut rig.trailer_body]) {
-            (body.front, body.rear, body.half_width) = (body.front + by, body.rear - by, body.half_width + by);
-        }
         let place = &scenario.places[0];
         let road = place.roundabout.seen();
         let speed = asked.speed_kmh / 3.6;
@@ -106,8 +97,8 @@ impl Case {
             straights: [scenario.approach, scenario.departure],
             road,
             asked: asked.clone(),
+            grown: grown(&world, asked.clearance),
             world,
-            grown: grown.into(),
             rig: vehicle.rig(&asked.load, (SPACING / speed) as f32, None),
             step: scenario.step,
         }
@@ -143,26 +134,17 @@ impl Case {
     fn row(&self, route: usize, found: &Found, passes: &[Pass]) -> Result<Row, Error> {
         let (path, asks) = self.on_centre(route);
         let (lock, grip) = (Limit::Lock.of(&self.rig).to_radians(), f64::from(self.rig.lateral_acceleration_max));
-        let holds = asks.steering <= lock && asks.lateral_acceleration <= grip && asks.load_transfer_ratio < 1.0;
-        let keeps = |clearance: f64| self.asked.clearance - SLACK <= clearance;
-        let lane_centre = self.way(route, &path, &asks, |clearance| holds && keeps(clearance));
-        let mut searched_clearance = self.asked.clearance;
-        let mut search = found.clone();
-        if !found.arrived() && 0.0 < searched_clearance {
-            // How near would it come? The narrowest search says so soon.
-            let nearer =
-                crate::certificate::attempt::attempt(&self.world, route as u32, &Start::default(), &passes[..1], None)?;
-            if nearer.arrived() {
-                (search, searched_clearance) =
-                    (Found { env_steps: search.env_steps + nearer.env_steps, ..nearer }, 0.0);
-            }
-        }
-        let way = if search.arrived() {
-            let (path, asks) = self.driven(route, &search)?;
-            Some(self.way(route, &path, &asks, keeps))
-        } else {
-            None
+        let refused = |clearance: f64| {
+            let limits = [
+                (Refusal::Kerb, self.keeps(clearance)),
+                (Refusal::Lock, asks.steering <= lock),
+                (Refusal::Tyres, asks.lateral_acceleration <= grip),
+                (Refusal::Rollover, asks.load_transfer_ratio < 1.0),
+            ];
+            limits.into_iter().find(|(_, holds)| !holds).map(|(refusal, _)| refusal)
         };
+        let lane_centre = self.way(route, &path, &asks, refused);
+        let (search, searched_clearance, way) = self.searched(route, found, passes)?;
         let waypoints = self.world.route_waypoints(route as u32);
         let slowest = Profile::of(&self.rig, waypoints, FASTEST).speeds.into_iter().fold(FASTEST, f64::min);
         Ok(Row {
@@ -177,8 +159,14 @@ impl Case {
         })
     }
 
-    fn way(&self, route: usize, path: &Path, asks: &Asks, holds: impl FnOnce(f64) -> bool) -> Way {
-        Way::of(path, asks, &self.road, &self.routes[route], &self.kerbs, self.straights, holds)
+    pub(super) fn way(
+        &self,
+        route: usize,
+        path: &Path,
+        asks: &Asks,
+        refused: impl FnOnce(f64) -> Option<Refusal>,
+    ) -> Way {
+        Way::of(path, asks, &self.road, &self.routes[route], &self.kerbs, self.straights, refused)
     }
 
     /// The path with the front axle on the lane's centre line, and what it asks.
@@ -198,7 +186,7 @@ impl Case {
     }
 
     /// The way that a search found, driven again, and what it asks.
-    fn driven(&self, route: usize, found: &Found) -> Result<(Path, Asks), Error> {
+    pub(super) fn driven(&self, route: usize, found: &Found) -> Result<(Path, Asks), Error> {
         let route = route as u32;
         let limit = self.world.most_steps(&Truck { route, ..Truck::default() });
         let actions = file::actions(&found.actions, self.world.params.n_actions, limit)

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::way::Way;
+use super::way::{Refusal, Way};
 use crate::certificate::file::Found;
 
 /// A route and a vehicle: whether it fits, how, and how fast.
@@ -50,6 +50,11 @@ impl Row {
     /// Whether the path to be shown is the way found.
     pub fn shows_way(&self) -> bool {
         !self.lane_centre.fits && self.way.is_some()
+    }
+
+    /// The limit of the truck that refuses the path to be shown; none where a kerb does, which the clearance says.
+    pub fn limit(&self) -> Option<Refusal> {
+        self.shown().refused_by.filter(|refusal| !self.fits && *refusal != Refusal::Kerb)
     }
 
     /// The verdict in a word or two: `lane centre`, `other way` or `does not fit`.

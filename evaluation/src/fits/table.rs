@@ -35,6 +35,14 @@ impl Units {
         }
     }
 
+    /// A way's clearance with its digits, rounded down where the way does not fit: it is not what is asked for.
+    pub fn clearance(self, way: &Way) -> String {
+        let (unit, parts) = if self == Units::Metric { (1.0, 100.0) } else { (FOOT, 10.0) };
+        // Clearances have four digits: what is less is the rounding of a product.
+        let down = ((way.clearance() / unit * parts + 1e-3).floor() / parts) * unit;
+        self.length(if way.fits { way.clearance() } else { down })
+    }
+
     /// The unit of lengths.
     pub fn of_length(self) -> &'static str {
         match self {
@@ -74,7 +82,7 @@ type Column = ([String; 2], Box<dyn Fn(&Row) -> String>);
 fn columns(rows: &[Row], units: Units) -> Vec<Column> {
     let unit = units.of_length();
     let length = move |value: f64| units.length(value);
-    let of_way = move |way: Option<&Way>| way.map_or("-".to_owned(), |way| length(way.clearance()));
+    let of_way = move |way: Option<&Way>| way.map_or("-".to_owned(), |way| units.clearance(way));
     let heading = |first: &str, second: &str| [first.to_owned(), second.to_owned()];
     let mut columns: Vec<Column> = vec![
         (heading("fits by", ""), Box::new(|row| row.verdict().to_owned())),
@@ -149,8 +157,8 @@ pub fn table(rows: &[Row], width: usize, units: Units) -> String {
     text
 }
 
-/// The verdicts as CSV: a row for each route, a column for each vehicle, in the cells by what it fits and the clearance
-/// of the path shown (m).
+/// The verdicts as CSV: a row for each route, a column for each vehicle, in the cells by what it fits, or which limit
+/// of the truck refuses it, and the clearance of the path shown (m).
 pub fn verdicts(rows: &[Row]) -> String {
     let mut vehicles: Vec<&str> = Vec::new();
     let mut routes: Vec<(&str, HashMap<&str, String>)> = Vec::new();
@@ -158,7 +166,8 @@ pub fn verdicts(rows: &[Row]) -> String {
         if !vehicles.contains(&row.vehicle.as_str()) {
             vehicles.push(&row.vehicle);
         }
-        let cell = format!("{} {}", row.verdict(), Units::Metric.length(row.shown().clearance()));
+        let limit = row.limit().map_or_else(String::new, |limit| format!(": {}", limit.name()));
+        let cell = format!("{}{limit} {}", row.verdict(), Units::Metric.clearance(row.shown()));
         match routes.iter_mut().find(|(route, _)| *route == row.route) {
             Some((_, cells)) => drop(cells.insert(&row.vehicle, cell)),
             None => routes.push((&row.route, HashMap::from([(row.vehicle.as_str(), cell)]))),
@@ -211,13 +220,14 @@ fn way_cells(way: &Way) -> Vec<String> {
     let radius = way.lowest_radius.map(|radius| radius.to_string()).unwrap_or_default();
     let cells = numbers.iter().map(f64::to_string).chain([radius]).chain(after.iter().map(f64::to_string));
     let apron = way.apron_clearance.map(|clearance| clearance.to_string()).unwrap_or_default();
-    std::iter::once(way.fits.to_string()).chain(cells).chain([apron]).collect()
+    let refused_by = way.refused_by.map(|refusal| refusal.name().to_owned()).unwrap_or_default();
+    std::iter::once(way.fits.to_string()).chain(cells).chain([apron, refused_by]).collect()
 }
 
 /// The answers as CSV, a row each under one of names, in metres and as `fits.json` names them; columns of the lane's
 /// centre line begin with `lane_centre_`, those of the way found with `way_`.
 pub fn csv(rows: &[Row]) -> String {
-    let way_names = || WAY.iter().copied().chain(["load_transfer_ratio", "apron_clearance"]);
+    let way_names = || WAY.iter().copied().chain(["load_transfer_ratio", "apron_clearance", "refused_by"]);
     let mut heading: Vec<String> = ["route", "vehicle", "fits", "fastest_kmh"].map(str::to_owned).to_vec();
     for prefix in ["lane_centre_", "way_"] {
         heading.extend(way_names().map(|name| format!("{prefix}{name}")));
@@ -235,7 +245,7 @@ pub fn csv(rows: &[Row]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::way::Nearest;
+    use super::super::way::{Nearest, Refusal};
     use super::*;
     use crate::certificate::file::Found;
 
@@ -243,6 +253,7 @@ mod tests {
         let near = Nearest { clearance: -0.25, x: 1.0, y: 2.0 };
         let way = Way {
             fits: false,
+            refused_by: Some(Refusal::Kerb),
             tractor: Nearest { clearance: 0.5, ..near },
             trailer: near,
             swept_width: 5.5,
@@ -324,12 +335,29 @@ mod tests {
     }
 
     #[test]
+    fn a_verdict_names_the_limit_that_refuses_and_its_clearance_is_rounded_down() {
+        let of = |clearance: f64, refusal: Refusal| {
+            let mut row = row("16m/N-left-3", "us_wb62");
+            let near = Nearest { clearance, x: 0.0, y: 0.0 };
+            (row.lane_centre.tractor, row.lane_centre.trailer) = (near, near);
+            row.lane_centre.refused_by = Some(refusal);
+            let text = verdicts(std::slice::from_ref(&row));
+            (text.lines().nth(1).unwrap().split_once(',').unwrap().1.to_owned(), csv(&[row]))
+        };
+        assert_eq!(of(-0.0022, Refusal::Kerb).0, "does not fit -0.01");
+        assert_eq!(of(0.4962, Refusal::Kerb).0, "does not fit 0.49");
+        assert_eq!(of(0.29, Refusal::Kerb).0, "does not fit 0.29");
+        let (verdict, csv) = of(3.21, Refusal::Lock);
+        assert!(verdict == "does not fit: lock 3.21" && csv.contains(",lock,"), "{verdict} {csv}");
+    }
+
+    #[test]
     fn every_row_of_csv_has_a_cell_for_each_name_and_names_with_commas_are_quoted() {
         let mut with_way = row("a", "b");
         with_way.way = Some(with_way.lane_centre.clone());
         let text = csv(&[row("a", "b"), with_way]);
         let lines: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
-        assert_eq!(lines.iter().map(Vec::len).collect::<Vec<_>>(), [38; 3]);
+        assert_eq!(lines.iter().map(Vec::len).collect::<Vec<_>>(), [40; 3]);
         let of = |name: &str, line: usize| lines[line][lines[0].iter().position(|other| *other == name).unwrap()];
         assert_eq!((of("lane_centre_trailer_clearance", 1), of("way_trailer_clearance", 1)), ("-0.25", ""));
         assert_eq!((of("way_lowest_radius", 2), of("way_load_transfer_ratio", 2)), ("", "0.2"));

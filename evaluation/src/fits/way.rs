@@ -50,12 +50,41 @@ pub struct Nearest {
     pub y: f64,
 }
 
+/// What refuses a path.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Refusal {
+    /// A kerb that is nearer than is asked for.
+    Kerb,
+    /// The limit of the steer angle.
+    Lock,
+    /// The tyres' grip.
+    Tyres,
+    /// The load: the inner wheels lift.
+    Rollover,
+}
+
+impl Refusal {
+    /// Its name in JSON: `kerb`, `lock`, `tyres`, `rollover`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Refusal::Kerb => "kerb",
+            Refusal::Lock => "lock",
+            Refusal::Tyres => "tyres",
+            Refusal::Rollover => "rollover",
+        }
+    }
+}
+
 /// The figures of a path.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Way {
     /// Whether both units keep the clearance asked for and the truck can steer and hold the path.
     pub fits: bool,
+    /// What refuses the path first; none where it fits.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub refused_by: Option<Refusal>,
     /// Where the tractor comes nearest to a kerb.
     pub tractor: Nearest,
     /// Where the trailer comes nearest to a kerb.
@@ -88,8 +117,7 @@ pub struct Way {
 
 impl Way {
     /// The figures of `path` on `route` of a road as it lies in the world, with these kerbs. `straights` are the
-    /// lengths of the route before and after the ring (m); `fits` is decided by `holds` and by the clearance that is
-    /// asked for.
+    /// lengths of the route before and after the ring (m); `refused` says of the clearance what refuses the path.
     pub fn of(
         path: &Path,
         asks: &Asks,
@@ -97,7 +125,7 @@ impl Way {
         route: &Route,
         kerbs: &UnitKerbs,
         straights: [f64; 2],
-        holds: impl FnOnce(f64) -> bool,
+        refused: impl FnOnce(f64) -> Option<Refusal>,
     ) -> Way {
         let Path { poses, rig } = path;
         let [tractor, trailer] = path.clearances(kerbs);
@@ -115,8 +143,10 @@ impl Way {
         let widest = swept.iter().max_by(|a, b| a.width().total_cmp(&b.width()));
         let (swept_width, at) = widest.map_or((0.0, DVec2::ZERO), |section| (section.width(), section.at));
         let [left, right] = leaves(path, road, route, straights);
+        let refused_by = refused(tractor.clearance.min(trailer.clearance));
         Way {
-            fits: holds(tractor.clearance.min(trailer.clearance)),
+            fits: refused_by.is_none(),
+            refused_by,
             tractor,
             trailer,
             swept_width: to(ROUNDED, swept_width),
