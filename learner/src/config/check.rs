@@ -140,8 +140,12 @@ impl Config {
         (share.max(before_policy + of_values), why)
     }
 
-    /// Env steps before the first update of soft actor-critic: whole steps of all trucks.
+    /// Env steps before the first update of soft actor-critic, whole steps of all trucks: none of a refinement that
+    /// begins with a policy, at once.
     pub(crate) fn before_updates(&self) -> u64 {
+        if self.from.is_some() && self.refinement.as_ref().is_some_and(|refinement| refinement.begin <= 0.0) {
+            return 0;
+        }
         let of_each = self.replay_buffer.warmup.div_ceil(self.n_envs).max(self.learning.n_steps + 1);
         (of_each * self.n_envs) as u64
     }
