@@ -326,9 +326,12 @@ fn check(file: &Path, map: &Map, choice: &Choice) -> Result<(), Error> {
     };
     for place in &places {
         match place {
-            Ok(Imported { warnings, .. }) => warnings.iter().for_each(|warning| {
-                let _ = writeln!(text, "{warning}");
-            }),
+            // What is said of the map's roads is said above.
+            Ok(Imported { warnings, .. }) => {
+                for warning in warnings.iter().filter(|warning| !map.warnings().any(|said| said == **warning)) {
+                    let _ = writeln!(text, "{warning}");
+                }
+            }
             Err(error) => {
                 let _ = writeln!(text, "{error}");
             }

@@ -138,3 +138,27 @@ fn links_to_roads_that_there_are_not_and_to_neither_end_are_warned_of() {
     let both = format!("{}<border sOffset=\"0\" a=\"1\" b=\"0\" c=\"0\" d=\"0\"/>{}", &text[..width], &text[width..]);
     assert!(warnings(&both).contains("has width and border; the border is not read"), "{}", warnings(&both));
 }
+
+#[test]
+fn an_import_says_what_is_said_of_its_own_roads_and_not_of_others() {
+    let text = plain();
+    let road = text.lines().find(|line| line.contains(" id=\"1\" junction")).unwrap();
+    let said = |text: &str| imported(&parsed(text)).warnings;
+    let of_plain = said(&text).len();
+    for (changed, expected) in [
+        (format!("{road}\n{road}"), "road 1: has the id of an earlier road; it is left out"),
+        (
+            road.replace("<road ", "<road rule=\"XYZ\" "),
+            "road 1: its rule XYZ is neither RHT nor LHT; it counts as RHT",
+        ),
+        (road.replace("<road ", "<road rule=\"LHT\" "), "1 of 20 roads have left-hand traffic"),
+    ] {
+        let warnings = said(&text.replace(road, &changed));
+        assert_eq!(warnings.len(), of_plain + 1, "{warnings:?}");
+        assert!(warnings[of_plain].starts_with(expected), "{warnings:?}");
+    }
+    let far = road.replace("x=\"38\"", "x=\"3800\"").replace(" id=\"1\" junction", " rule=\"XYZ\" id=\"12\" junction");
+    let map = parsed(&text.replace(road, &format!("{road}\n{far}")));
+    assert!(map.warnings().any(|warning| warning.starts_with("road 12: its rule XYZ")));
+    assert_eq!(imported(&map).warnings.len(), of_plain);
+}

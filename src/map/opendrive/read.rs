@@ -225,6 +225,7 @@ impl Source<'_, '_> {
                 "{left} of {} roads have left-hand traffic, the others right-hand; most count for all",
                 rules.len()
             );
+            self.records.mixed_hands = Some(both.clone());
             self.records.warnings.push(both);
         }
         rules.len() < 2 * left

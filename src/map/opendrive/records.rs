@@ -218,6 +218,8 @@ pub(super) struct Records {
     pub(super) offset: Option<[f64; 4]>,
     /// Lane types that are not known, with their numbers of lanes.
     pub(super) unknown_types: BTreeMap<String, usize>,
+    /// What is odd where some of its roads have left-hand traffic and others right-hand.
+    pub(super) mixed_hands: Option<String>,
     /// What is odd in the file, and what was done about it.
     pub(super) warnings: Vec<String>,
 }

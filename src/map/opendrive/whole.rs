@@ -1,8 +1,9 @@
 //! What is seen of a map only when all of it was read: links that lead nowhere, both ways of direct junctions, roads
 //! far from the others.
 
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 
+use super::paths::Network;
 use super::records::{Connection, Link, Records};
 use super::source::MOST_WARNINGS;
 use super::xml::shown;
@@ -12,6 +13,8 @@ use crate::files::reader::{Error, Reader};
 const FARTHEST: f64 = 500_000.0;
 /// A crossfall beyond this is warned of: what drains a road is less.
 pub(super) const TILTED: f64 = 0.03;
+/// How warnings of what is not level end.
+const LEVEL: &str = "the simulated road is level";
 /// Most unknown lane types that are named.
 const MOST_TYPES: usize = 20;
 
@@ -37,6 +40,20 @@ impl Records {
         let list = named.collect::<Vec<_>>().join(", ");
         let more = if MOST_TYPES < self.unknown_types.len() { ", and more" } else { "" };
         (!self.unknown_types.is_empty()).then(|| format!("lane types that are not known: {list}{more}"))
+    }
+
+    /// What is odd in the file about the roads of a place, and about the hand of traffic. Links that lead nowhere,
+    /// grades and crossfalls are told of the place itself.
+    pub(super) fn warnings_around(&self, network: &Network) -> Vec<String> {
+        let roads: BTreeSet<usize> = network.strips.values().map(|strip| strip.road).collect();
+        let names: Vec<String> = roads.iter().map(|&road| format!("road {}", shown(&self.roads[road].id))).collect();
+        let is_told = |warning: &str| warning.ends_with(LEVEL) || warning.contains("is linked to");
+        let is_about = |warning: &str| {
+            let after = |name: &String| warning.strip_prefix(name.as_str());
+            names.iter().filter_map(after).any(|rest| rest.starts_with([':', ',']) && !is_told(rest))
+        };
+        let of_roads = self.warnings.iter().filter(|warning| is_about(warning));
+        of_roads.chain(&self.mixed_hands).cloned().collect()
     }
 
     /// An error if a road begins too far from the others.
