@@ -35,12 +35,15 @@ impl Units {
         }
     }
 
-    /// A way's clearance with its digits, rounded down where the way does not fit: it is not what is asked for.
+    /// A way's clearance with its digits: of one that does not fit rounded down where it would seem to (m).
     pub fn clearance(self, way: &Way) -> String {
+        let nearest = self.length(way.clearance());
+        if way.fits || nearest.starts_with('-') {
+            return nearest;
+        }
         let (unit, parts) = if self == Units::Metric { (1.0, 100.0) } else { (FOOT, 10.0) };
         // Clearances have four digits: what is less is the rounding of a product.
-        let down = ((way.clearance() / unit * parts + 1e-3).floor() / parts) * unit;
-        self.length(if way.fits { way.clearance() } else { down })
+        self.length((way.clearance() / unit * parts + 1e-3).floor() / parts * unit)
     }
 
     /// The unit of lengths.
@@ -335,7 +338,7 @@ mod tests {
     }
 
     #[test]
-    fn a_verdict_names_the_limit_that_refuses_and_its_clearance_is_rounded_down() {
+    fn a_verdict_names_the_limit_that_refuses_and_its_clearance_never_seems_to_do() {
         let of = |clearance: f64, refusal: Refusal| {
             let mut row = row("16m/N-left-3", "us_wb62");
             let near = Nearest { clearance, x: 0.0, y: 0.0 };
@@ -346,6 +349,7 @@ mod tests {
         };
         assert_eq!(of(-0.0022, Refusal::Kerb).0, "does not fit -0.01");
         assert_eq!(of(0.4962, Refusal::Kerb).0, "does not fit 0.49");
+        assert_eq!(of(-0.4931, Refusal::Kerb).0, "does not fit -0.49");
         assert_eq!(of(0.29, Refusal::Kerb).0, "does not fit 0.29");
         let (verdict, csv) = of(3.21, Refusal::Lock);
         assert!(verdict == "does not fit: lock 3.21" && csv.contains(",lock,"), "{verdict} {csv}");
