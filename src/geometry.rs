@@ -17,7 +17,7 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec2;
 
 pub use alignment::{Bend, Misfit, rounded, to_circle};
-pub use area::ROUNDED;
+pub use area::{ROUNDED, counter_clockwise};
 pub(crate) use fit::arc_of_height;
 pub use fit::{bulging_outline, fitted_line, fitted_outline};
 pub use outline::{Nearby, Outline};

@@ -326,20 +326,11 @@ impl Config {
         }
     }
 
-    /// Whether a run with this config can continue one with the other: only budget and checkpoint interval may differ.
-    pub fn is_same_run(&self, other: &Config) -> bool {
-        *self == other.with_budget_of(self)
-    }
-
-    /// The first key, and its two values, that keeps a run with this config from continuing one with the other; as
-    /// [`Config::first_difference`].
+    /// The first key, and its two values, that keeps a run with this config from continuing one with the other, as
+    /// [`Config::first_difference`]: only budget and checkpoint interval may differ.
     pub(crate) fn hindrance(&self, other: &Config) -> Option<(String, String, String)> {
-        self.first_difference(&other.with_budget_of(self))
-    }
-
-    /// This config with budget and checkpoint interval of the other.
-    fn with_budget_of(&self, &Config { minutes, steps, checkpoint_minutes, .. }: &Config) -> Config {
-        Config { minutes, steps, checkpoint_minutes, ..self.clone() }
+        let Config { minutes, steps, checkpoint_minutes, .. } = *self;
+        self.first_difference(&Config { minutes, steps, checkpoint_minutes, ..other.clone() })
     }
 
     /// The first key whose value differs from that of `other`, and the two values, each `nothing` where it is not

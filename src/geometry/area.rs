@@ -58,7 +58,7 @@ pub(crate) fn densified(contour: &[DVec2], step: f64) -> Vec<DVec2> {
 }
 
 /// A contour that does not cross itself, turned around if it is clockwise.
-pub(crate) fn counter_clockwise(mut contour: Vec<DVec2>) -> Vec<DVec2> {
+pub fn counter_clockwise(mut contour: Vec<DVec2>) -> Vec<DVec2> {
     let n = contour.len();
     if (0..n).map(|i| contour[i].perp_dot(contour[(i + 1) % n])).sum::<f64>() < 0.0 {
         contour.reverse();

@@ -18,6 +18,7 @@ use std::path::Path;
 use glam::DVec2;
 
 pub use dxf::Unit;
+use dxf::folded;
 pub use site::Drawn;
 
 use super::opendrive::of_windows_1252;
@@ -40,6 +41,12 @@ pub fn is_geojson(file: &Path) -> bool {
 fn is_named(file: &Path, extensions: &[&str]) -> bool {
     let of = |extension: &std::ffi::OsStr| extensions.iter().any(|known| extension.eq_ignore_ascii_case(known));
     file.extension().is_some_and(of)
+}
+
+/// Whether two names are of the same layer: as in a DXF, capitals do not count.
+pub fn is_same_layer(one: &str, other: &str) -> bool {
+    // Most names are ASCII, and a drawing has many entities.
+    one.eq_ignore_ascii_case(other) || !(one.is_ascii() && other.is_ascii()) && folded(one) == folded(other)
 }
 
 /// How a drawing is read.

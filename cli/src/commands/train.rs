@@ -110,6 +110,7 @@ fn check_settings(args: &Args) -> Result<(), Error> {
         ("--from", args.from.is_some(), "from"),
         ("--adapter", args.adapter.is_some(), "adapter"),
     ];
+    let budgets = [("--steps", args.steps.is_some(), "minutes"), ("--minutes", args.minutes.is_some(), "steps")];
     fn key_of(setting: &str) -> Option<&str> {
         setting.split_once('=').map(|(key, _)| key.trim())
     }
@@ -118,7 +119,6 @@ fn check_settings(args: &Args) -> Result<(), Error> {
         if let Some(other) = args.settings[..index].iter().find(|other| key.is_some() && key_of(other) == key) {
             return Err(Error::setting("--set", setting, format!("{other} is given, too: leave one of them out")));
         }
-        let budgets = [("--steps", args.steps.is_some(), "minutes"), ("--minutes", args.minutes.is_some(), "steps")];
         if let Some((flag, ..)) = budgets.iter().find(|(_, is_given, other)| *is_given && Some(*other) == key) {
             let expected =
                 format!("{flag} replaces the whole budget: leave it out, or give steps and minutes by --set");

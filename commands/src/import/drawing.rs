@@ -1,7 +1,7 @@
 //! A roundabout from a drawing, a DXF or GeoJSON file, as an outline file.
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use offtrack::map::drawing::{self, Drawn, Layers, Unit};
+use offtrack::map::drawing::{self, Drawn, Layers, Unit, is_same_layer};
 use offtrack::map::opendrive::{Hand, Imported};
 
 use offtrack_evaluation::error::Error;
@@ -96,8 +96,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     };
     let named = [("--kerb-layer", &layers.kerbs), ("--lane-layer", &layers.lanes), ("--apron-layer", &layers.aprons)];
     for (index, (flag, layer)) in named.iter().enumerate() {
-        if let Some((other, _)) = named[..index].iter().find(|(_, other)| other.to_lowercase() == layer.to_lowercase())
-        {
+        if let Some((other, _)) = named[..index].iter().find(|(_, other)| is_same_layer(other, layer)) {
             let expected = format!("is that of {other} too: each part is on a layer of its own");
             return Err(Error::Setting { name: flag, value: layer.to_string(), expected });
         }

@@ -4,7 +4,7 @@
 //! drawn in metres: their frame is named by the member `crs` of the GeoJSON before it, where it is known.
 
 use glam::DVec2;
-use offtrack::geometry::{Curve, ROUNDED};
+use offtrack::geometry::{Curve, ROUNDED, counter_clockwise};
 use offtrack::map::ground::Kerb;
 use offtrack::map::{Gutter, Road};
 use offtrack::vehicle::swept::{Pose, front_path};
@@ -39,6 +39,7 @@ pub fn geojson(road: &Road, gutter: Gutter, shown: &[&Shown], crs: Option<&str>)
             Kerb::Island => "island".to_owned(),
             Kerb::Splitter(arm) => format!("splitter {}", ground.arms[arm].name),
         };
+        // An exterior ring of RFC 7946 is counter-clockwise, an island's too.
         features.push(feature(
             json!({"part": "kerb", "of": of}),
             "Polygon",
@@ -152,14 +153,6 @@ impl Frame {
         }
         json!(polygons)
     }
-}
-
-/// A polygon as an exterior ring of RFC 7946 runs, an island's too.
-fn counter_clockwise(mut ring: Vec<DVec2>) -> Vec<DVec2> {
-    if signed_area(&ring) < 0.0 {
-        ring.reverse();
-    }
-    ring
 }
 
 /// The area of a polygon, positive counter-clockwise (m²).

@@ -181,8 +181,8 @@ pub(super) fn branched(
 }
 
 /// The actions that differ within `hold` steps: the steer angle changes at a limited rate, so all levels beyond reach
-/// are equal. The `last` action represents those equal to it, so that a sequence changes seldom. `steering` is the steer
-/// angle once all that was asked for before has taken effect (rad).
+/// are equal. The `last` action represents those equal to it, so that a sequence changes seldom. `steering` is the
+/// steer angle once all that was asked for before has taken effect (rad).
 fn distinct(world: &World, rig: &Rig, steering: f32, last: u32, hold: usize) -> Vec<u32> {
     let params = &world.params;
     let reach = rig.steer_rate * (hold as u32 * params.n_substeps) as f32 * params.substep;

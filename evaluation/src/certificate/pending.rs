@@ -39,17 +39,19 @@ impl<'a> Pending<'a> {
 
     /// Steer angle that the front axle has once all of that has taken effect, from `steering` on (rad).
     pub(super) fn followed(&self, steering: f32) -> f32 {
-        let n_substeps = self.world.params.n_substeps;
-        let actions = self.words().into_iter().take(self.late_actions()).map(|word| match word {
-            0 => 0.0,
-            word => self.world.actions[word as usize - 1].steering,
-        });
-        // Latest first.
-        let asked: Vec<f32> = actions.chain(self.angles()).collect();
+        let (n_substeps, late) = (self.world.params.n_substeps, self.late_actions());
+        // By how many steps ago it was asked for: the actions on their way, then what the axle follows late.
+        let asked = |steps: usize| match steps.checked_sub(late + 1) {
+            Some(before) => self.angles()[before],
+            None => match self.words()[steps - 1] {
+                0 => 0.0,
+                word => self.world.actions[word as usize - 1].steering,
+            },
+        };
         let reach = self.rig.steer_rate * self.world.params.substep;
-        let delay = self.late_actions() as u32 * n_substeps + self.rig.steer_delay;
+        let delay = late as u32 * n_substeps + self.rig.steer_delay;
         (1..=delay).rev().fold(steering, |steering, ago| {
-            asked[ago.div_ceil(n_substeps) as usize - 1].clamp(steering - reach, steering + reach)
+            asked(ago.div_ceil(n_substeps) as usize).clamp(steering - reach, steering + reach)
         })
     }
 

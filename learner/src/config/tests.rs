@@ -370,5 +370,5 @@ fn a_rule_is_one_of_two_on_the_processor_alone_and_part_of_what_makes_a_run() {
     assert!(on_device.contains("rule: given; works with device = \"cpu\" alone"), "{on_device}");
     let (with, without) = (read(&["rule=\"yields\""]).unwrap(), read(&[]).unwrap());
     assert_eq!((with.rule, without.rule), (Some(Rule::Yields), None));
-    assert!(!with.is_same_run(&without));
+    assert_eq!(with.hindrance(&without).unwrap().0, "rule");
 }

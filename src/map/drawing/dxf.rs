@@ -8,7 +8,7 @@ use std::path::Path;
 use glam::DVec2;
 
 use super::pairs::{Pair, pairs};
-use super::{Drawing, Entity, Layers};
+use super::{Drawing, Entity, Layers, is_same_layer};
 use crate::files::reader::{Error, Reader};
 use crate::geometry::{Curve, Piece, arc_of_height};
 
@@ -120,7 +120,7 @@ impl Drawing {
                 let place = format!("line {}", entity[0].line);
                 return Err(reader.invalid(place, found, "kerbs, lanes or aprons lie in this block: explode it"));
             }
-            let is = |name: &str| folded(layer) == folded(name);
+            let is = |name: &str| is_same_layer(layer, name);
             let target = if is(&layers.kerbs) {
                 &mut drawing.kerbs
             } else if is(&layers.lanes) {
@@ -273,7 +273,7 @@ fn drawn_blocks(pairs: &[Pair], layers: &Layers) -> HashSet<String> {
     let name_of = |entity: &[Pair]| folded(text_of(entity, 2).unwrap_or_default());
     for entity in section(pairs, "BLOCKS") {
         let layer = text_of(entity, 8).unwrap_or_default();
-        let is_drawn = [&layers.kerbs, &layers.lanes, &layers.aprons].iter().any(|one| folded(layer) == folded(one));
+        let is_drawn = [&layers.kerbs, &layers.lanes, &layers.aprons].iter().any(|one| is_same_layer(layer, one));
         match entity[0].value {
             "BLOCK" => block = name_of(entity),
             // What stands on layer 0 of a block takes the layer of the insertion.

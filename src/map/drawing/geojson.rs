@@ -9,8 +9,8 @@ use glam::DVec2;
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::dxf::{folded, reach};
-use super::{Drawing, Entity, Layers, Unit};
+use super::dxf::reach;
+use super::{Drawing, Entity, Layers, Unit, is_same_layer};
 use crate::files::reader::{Error, Reader, shortened};
 use crate::geometry::area::densified;
 use crate::geometry::{Curve, Piece, fitted_outline};
@@ -104,7 +104,7 @@ pub(super) fn drawing(file: &Path, text: &str, layers: &Layers) -> Result<Drawin
     let mut left = LONGEST;
     for (index, feature) in collection.features.iter().enumerate() {
         let (part, place) = (feature.part(), format!("feature {}", index + 1));
-        let is = |layer: &str| folded(part) == folded(layer);
+        let is = |layer: &str| is_same_layer(part, layer);
         let Some(geometry) = &feature.geometry else {
             drawing.notes.push(format!("{place} has no geometry and is left out"));
             continue;
@@ -174,7 +174,7 @@ const PROJECT: &str = "coordinates must be metres, not degrees: project them, as
 /// An error if the kerbs' coordinates are as near to each other as they are in degrees, on either side of 180 deg too.
 fn check_extent(reader: &Reader, features: &[Feature], layers: &Layers) -> Result<(), Error> {
     let mut positions = Vec::new();
-    let kerbs = features.iter().filter(|feature| folded(feature.part()) == folded(&layers.kerbs));
+    let kerbs = features.iter().filter(|feature| is_same_layer(feature.part(), &layers.kerbs));
     kerbs.filter_map(|kerb| kerb.geometry.as_ref()).for_each(|one| collect_positions(&one.coordinates, &mut positions));
     let on_earth = |p: &DVec2| p.x.abs() <= 180.0 && p.y.abs() <= 90.0;
     let extent = |place: fn(&DVec2) -> DVec2| {

@@ -9,6 +9,7 @@ use super::lanes::Strip;
 use super::paths::Network;
 use super::records::RoadRecord;
 use super::surroundings::encloses;
+use super::whole::LEVEL;
 use super::xml::shown;
 
 /// Lanes that overlap with a rise of more than this between them are a bridge and what passes below it (m).
@@ -85,7 +86,7 @@ pub(super) fn bridges(map: &Map, network: &Network) -> Vec<String> {
     let high = above.into_iter().filter(|(_, (rise, _))| CLEARANCE < *rise);
     high.map(|(upper, (rise, lower))| {
         let (upper, lower) = (shown(upper), shown(lower));
-        format!("road {upper} passes {rise:.1} m above road {lower}; the simulated road is level, and both are paved")
+        format!("road {upper} passes {rise:.1} m above road {lower}; {LEVEL}, and both are paved")
     })
     .collect()
 }

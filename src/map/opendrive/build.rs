@@ -15,7 +15,7 @@ use super::paths::Network;
 use super::records::Level;
 use super::rings::fitted_circle;
 use super::surroundings::{self, Part, REACH, clipped, encloses_origin, outline};
-use super::whole::TILTED;
+use super::whole::{LEVEL, TILTED};
 use super::{FINEST, Map, Ring};
 use crate::files::reader::{Error, Reader};
 use crate::geometry::area::{Area, counter_clockwise, densified, points, signed_area};
@@ -273,7 +273,7 @@ fn tilt(map: &Map, network: &Network) -> Option<String> {
     };
     let parts = [largest(|level| level.grade, GRADE, "grades"), largest(|level| level.crossfall, TILTED, "crossfall")];
     let list = parts.into_iter().flatten().collect::<Vec<_>>().join(" and ");
-    (!list.is_empty()).then(|| format!("{list}; the simulated road is level"))
+    (!list.is_empty()).then(|| format!("{list}; {LEVEL}"))
 }
 
 /// Adds the routes through a ring: from each of an arm's two entry lanes next to the kerb to every exit.

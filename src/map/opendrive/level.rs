@@ -4,6 +4,7 @@ use roxmltree::Node;
 
 use super::records::{Cubic, Level, RoadRecord, active};
 use super::source::Source;
+use super::whole::LEVEL;
 use super::xml::{attribute, child, children};
 use crate::files::reader::Error;
 
@@ -68,13 +69,10 @@ impl Source<'_, '_> {
         let step = |pair: &[Cubic]| ((pair[1].factors[0] - pair[0].at(pair[1].start)).abs(), pair[1].start);
         let largest = elevation.windows(2).map(step).max_by(|one, other| one.0.total_cmp(&other.0));
         if let Some((step, s)) = largest.filter(|(step, _)| STEP < *step) {
-            self.warn(
-                node,
-                &format!("its elevation jumps by up to {step:.2} m, at s {s:.2} m; the simulated road is level"),
-            );
+            self.warn(node, &format!("its elevation jumps by up to {step:.2} m, at s {s:.2} m; {LEVEL}"));
         }
         if GRADE < grade {
-            self.warn(node, &format!("has a grade of {:.1} %; the simulated road is level", 100.0 * grade));
+            self.warn(node, &format!("has a grade of {:.1} %; {LEVEL}", 100.0 * grade));
         }
         Ok(Level { grade, crossfall: self.crossfall(node, road)?, elevation })
     }
@@ -99,7 +97,7 @@ impl Source<'_, '_> {
                 .fold(fall, f64::max);
         }
         if child(profile, "crossSectionSurface").is_some() {
-            self.warn(node, "its crossSectionSurface is not read; the simulated road is level");
+            self.warn(node, &format!("its crossSectionSurface is not read; {LEVEL}"));
         }
         // Shapes of one station follow each other across the road.
         let mut shapes: Vec<(f64, Cubic)> = Vec::new();

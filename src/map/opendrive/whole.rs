@@ -14,7 +14,7 @@ const FARTHEST: f64 = 500_000.0;
 /// A crossfall beyond this is warned of: what drains a road is less.
 pub(super) const TILTED: f64 = 0.03;
 /// How warnings of what is not level end.
-const LEVEL: &str = "the simulated road is level";
+pub(super) const LEVEL: &str = "the simulated road is level";
 /// Most unknown lane types that are named.
 const MOST_TYPES: usize = 20;
 
@@ -107,8 +107,7 @@ impl Records {
         let (percent, roads, all) = (100.0 * most.level.crossfall, tilted.count(), self.roads.len());
         let largest = format!("up to {percent:.1} % on road {}", shown(&most.id));
         self.warnings.push(format!(
-            "{roads} of {all} roads have a crossfall (superelevation, crossfall, shape), {largest}; the simulated road \
-             is level"
+            "{roads} of {all} roads have a crossfall (superelevation, crossfall, shape), {largest}; {LEVEL}"
         ));
     }
 
