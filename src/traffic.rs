@@ -90,7 +90,7 @@ pub const STEP: f32 = 0.1;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Error {
     /// The road has more of something than the tables hold.
-    #[error("{road}: {value} {of}; traffic takes at most {most}")]
+    #[error("{road}: {value} {of}; traffic takes at most {most}: a smaller road would do")]
     TooLarge {
         /// The road's name.
         road: String,

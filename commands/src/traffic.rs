@@ -94,7 +94,10 @@ impl Place {
     fn new(road: Road, mix: Mix) -> Result<Place, Error> {
         let bake = |loading: &Loading| Network::cached(&road, mix.has_large(), loading.cache);
         let network = roads::loading("baking", bake);
-        let network = network.map_err(|error| setting("ROAD", &road.name, &error.to_string()))?;
+        let network = network.map_err(|error| {
+            let said = error.to_string();
+            setting("ROAD", &road.name, said.strip_prefix(&format!("{}: ", road.name)).unwrap_or(&said))
+        })?;
         Ok(Place { road, network })
     }
 
@@ -119,6 +122,15 @@ fn bar(n_runs: usize) -> Bar {
 /// Writes what was found as JSON, where that is asked for.
 fn write_json(args: &Args, value: &impl serde::Serialize) -> Result<(), Error> {
     args.json.as_ref().map_or(Ok(()), |file| files::write_json(file, value))
+}
+
+/// A line about vehicles that stood in a blocked ring for ever; empty where there were none.
+fn taken_away(n: u64) -> String {
+    match n {
+        0 => String::new(),
+        1 => "1 vehicle stood in a blocked ring for two minutes and was taken away.\n".to_owned(),
+        n => format!("{n} vehicles stood in a blocked ring for two minutes and were taken away.\n"),
+    }
 }
 
 fn setting(name: &'static str, value: &str, expected: &str) -> Error {

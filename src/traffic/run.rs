@@ -36,6 +36,11 @@ impl<'a> Run<'a> {
         self.clock.step += 1;
     }
 
+    /// Takes away all that stand in a blocked ring, of whatever kind. `tell` hears of them.
+    pub fn take_away_stuck(&mut self, tell: impl FnMut(Event)) {
+        arrivals::take_away_stuck(self.setting.network, &mut self.cars, tell);
+    }
+
     /// Cars that wait outside.
     pub fn backlog(&self) -> Backlog {
         self.backlog

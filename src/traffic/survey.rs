@@ -179,6 +179,7 @@ impl<'a> Survey<'a> {
             let before: Vec<Car> = run.cars.clone();
             let mut events = Vec::new();
             run.step(|event, _| events.push(event));
+            run.take_away_stuck(|event| events.push(event));
             observer.observe(&run, &before, &events, step);
         }
         observer.count_unfinished(&run, WARM_UP + steps);

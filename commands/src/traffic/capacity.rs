@@ -15,7 +15,7 @@ use offtrack_evaluation::files;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{Args, LargeShare, Place, STEPS_A_MINUTE, bar, rounded, setting, table, write_json};
+use super::{Args, LargeShare, Place, STEPS_A_MINUTE, bar, rounded, setting, table, taken_away, write_json};
 
 /// Circulating flows (veh/h).
 const FLOWS: [f64; 5] = [0.0, 300.0, 600.0, 900.0, 1200.0];
@@ -41,6 +41,8 @@ struct Point {
     large: Option<LargeShare>,
     /// Its cars meet those of the arm's other lane on their way, which the manual does not know: it counts for no mean.
     lanes_meet: bool,
+    /// Vehicles of the arm that stood in a blocked ring for two minutes and were taken away.
+    removed: u64,
 }
 
 /// A queue without end at one arm, beside one flow.
@@ -67,12 +69,18 @@ pub(super) fn run(args: &Args, places: &[Place], mix: Mix) -> Result<(), Error> 
     let surveys = places.iter().map(|place| place.survey(&rules)).collect::<Result<Vec<Survey>, Error>>()?;
     let mut cases = Vec::new();
     for (place, survey) in places.iter().zip(&surveys) {
+        let n_before = cases.len();
         for arm in 0..place.network.n_arms {
             for (flow, circulating) in FLOWS.into_iter().enumerate() {
                 let saturated = survey.saturated(arm, circulating, mix);
                 let saturated = saturated.map_err(|error| setting("ROAD", &place.road.name, &error.to_string()))?;
                 cases.extend(saturated.map(|saturated| Case { place, survey, flow, saturated }));
             }
+        }
+        if cases.len() == n_before {
+            let expected = "no entry can be measured there: cars of other arms must pass it, and its own must have an \
+                            exit before they come to these arms; leave the road or --capacity out";
+            return Err(setting("ROAD", &place.road.name, expected));
         }
     }
     let bar = bar(cases.len() * args.runs as usize);
@@ -126,6 +134,7 @@ impl Case<'_> {
                 hcm: kind.capacity(circulating, large.came),
                 large: (0.0 < large.asked).then_some(large),
                 lanes_meet: self.saturated.lanes_meet[index],
+                removed: runs.iter().map(|counts| counts[index].removed).sum(),
             };
             (kind, point)
         };
@@ -198,10 +207,11 @@ fn text(points: &[(Lane, Point)]) -> String {
     } else {
         ""
     };
+    let removed = taken_away(points.iter().map(|(_, point)| point.removed).sum());
     let fewer: BTreeMap<&str, String> =
         points.iter().filter_map(|(_, point)| Some((point.road.as_str(), point.large?.note()?))).collect();
     let fewer: String = fewer.into_iter().map(|(road, note)| format!("{road}: {note}")).collect();
-    format!("{}{note}{fewer}\nmeans over all lanes of a kind\n{}", table(&rows), table(&sums))
+    format!("{}{note}{removed}{fewer}\nmeans over all lanes of a kind\n{}", table(&rows), table(&sums))
 }
 
 /// The means with the least and greatest of each, and the manual's curves.

@@ -9,7 +9,7 @@ use offtrack_evaluation::files;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{Args, LargeShare, Place, STEPS_A_MINUTE, bar, rounded, setting, table, write_json};
+use super::{Args, LargeShare, Place, STEPS_A_MINUTE, bar, rounded, setting, table, taken_away, write_json};
 use crate::progress::Bar;
 
 /// Period of the manual's delays and queues (h).
@@ -184,11 +184,7 @@ impl Found {
         } else {
             String::new()
         };
-        let removed = match self.removed {
-            0 => String::new(),
-            1 => "1 vehicle stood in a blocked ring for two minutes and was taken away.\n".to_owned(),
-            n => format!("{n} vehicles stood in a blocked ring for two minutes and were taken away.\n"),
-        };
+        let removed = taken_away(self.removed);
         let crowded = if 0.0 < self.crowded {
             let part = rounded(100.0 * self.crowded, 1);
             format!("{part} % of the time as many were on the road as can be, and others waited for that alone.\n")

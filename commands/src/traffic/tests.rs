@@ -1,5 +1,7 @@
 //! The command writes what it prints, and refuses what no road can have.
 
+use std::path::Path;
+
 use clap::Parser;
 use offtrack::traffic::Mix;
 use serde_json::Value;
@@ -14,6 +16,22 @@ struct Program {
 
 fn args(words: &[&str]) -> Args {
     Program::try_parse_from([&["traffic"], words].concat()).unwrap().args
+}
+
+/// A roundabout of so many arms with a ring of one lane, as a file.
+fn even(folder: &Path, n_arms: usize, island_radius: f64, ring_radius: f64, [ring, arm]: [f64; 2]) -> String {
+    let file = folder.join("even.toml");
+    let mut text = format!("[ring]\nisland_radius = {island_radius}\nlanes = 1\nlane_width = {ring}\ngutter = 0.5\n");
+    for index in 0..n_arms {
+        let (bearing, beside) = (360.0 * index as f64 / n_arms as f64, 0.5 + arm);
+        text += &format!(
+            "[[arm]]\nname = \"A{index}\"\nbearing_deg = {bearing}\nlength = 90.0\nlane_width = {arm}\n\
+             entry.kerb = {{ points = [{{ along = 30.0, offset = {beside} }}], ring_radius = {ring_radius} }}\n\
+             exit.kerb = {{ points = [{{ along = 30.0, offset = -{beside} }}], ring_radius = {ring_radius} }}\n"
+        );
+    }
+    std::fs::write(&file, text).unwrap();
+    file.to_str().unwrap().to_owned()
 }
 
 /// What the command writes as JSON.
@@ -110,6 +128,29 @@ fn who_stands_in_a_ring_that_large_vehicles_block_is_counted() {
     let (removed, served) = (found[0]["removed"].as_u64().unwrap(), found[0]["served"].as_f64().unwrap());
     // Two runs of 20 min.
     assert!(0 < removed && (removed as f64) < 0.1 * served * 2.0 / 3.0, "{removed} of {served} an hour");
+}
+
+#[test]
+fn a_small_ring_that_cars_alone_block_is_cleared() {
+    let folder = tempfile::tempdir().unwrap();
+    let road = even(folder.path(), 3, 1.5, 10.0, [9.0, 4.0]);
+    let found = |minutes| json(&[&road, "--demand", "1800", "--minutes", minutes, "--runs", "1"])[0].clone();
+    let [short, long] = ["20", "60"].map(found);
+    let [served, later] = [&short, &long].map(|found| found["served"].as_f64().unwrap());
+    assert!(long["removed"].as_u64().unwrap() > 0 && 0.5 * served < later, "{served} and {later} an hour");
+}
+
+#[test]
+fn a_road_where_no_capacity_can_be_measured_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let road = even(folder.path(), 2, 12.0, 12.0, [6.0, 6.0]);
+    let message = run(&args(&["16m", &road, "--capacity", "--minutes", "1"])).unwrap_err().to_string();
+    assert!(message.starts_with("ROAD: even; no entry can be measured there"), "{message}");
+    let large = even(folder.path(), 4, 200.0, 30.0, [4.0, 4.0]);
+    let text = std::fs::read_to_string(&large).unwrap().replace("length = 90.0", "length = 300.0");
+    std::fs::write(&large, text).unwrap();
+    let message = run(&args(&[&large])).unwrap_err().to_string();
+    assert!(message.starts_with("ROAD: even; ") && message.ends_with(": a smaller road would do"), "{message}");
 }
 
 #[test]
