@@ -5,7 +5,7 @@ use std::path::Path;
 
 use glam::DVec2;
 use offtrack::geometry::{Curve, Piece};
-use offtrack::map::ground::{Ground, Kerb, Line};
+use offtrack::map::ground::{Edges, Ground, Kerb, Line};
 use offtrack::map::opendrive::{Hand, Map, Options, exported};
 use offtrack::map::{Road, procedural};
 
@@ -98,6 +98,32 @@ fn a_road_that_is_written_as_a_map_is_read_back_with_its_routes_and_kerbs_within
                 assert!(off < if at_corner { LOST_AT_CORNERS } else { LOST }, "{name}: {off} at {p}");
             }
         }
+    }
+}
+
+#[test]
+fn wide_gutters_of_a_road_that_is_written_as_a_map_are_read_back() {
+    let arm = |index: u32| {
+        format!(
+            "[[arm]]\nname = \"A{index}\"\nbearing_deg = {}\nlength = 90.0\n\
+             entry.kerb = {{ points = [{{ along = 30.0, offset = 6.0 }}], ring_radius = 12.0 }}\n\
+             exit.kerb = {{ points = [{{ along = 30.0, offset = -6.0 }}], ring_radius = 12.0 }}\n",
+            90 * index
+        )
+    };
+    let ring = "[ring]\nisland_radius = 14.0\nlanes = 1\nlane_width = 4.0\ngutter = 2.0\n";
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("wide.toml");
+    std::fs::write(&file, ring.to_owned() + &(0..4).map(arm).collect::<String>()).unwrap();
+    let road = Road::read(&file).unwrap();
+    let (_, found) = read_back(&road);
+    let Edges::Own(edges) = &found.edges else { panic!("a map has edges of its own") };
+    let all: Vec<DVec2> = edges.loops.iter().flat_map(|curve| points(curve, 87.0)).collect();
+    assert!(2000 < all.len());
+    for p in all {
+        // Lanes win over gutters, and those that lead into the ring reach a little over the island's.
+        let off = (road.ground().faces.distance(p) - 2.0).abs();
+        assert!(off < 0.3, "{off} at {p}");
     }
 }
 

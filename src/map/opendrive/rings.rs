@@ -13,8 +13,9 @@ use super::records::Kind;
 use super::surface::{GAP, of};
 use crate::geometry::area::{Area, densified, points};
 
-/// Smallest and largest radius of an island (m).
-const RADII: [f64; 2] = [1.5, 200.0];
+/// Smallest and largest radius of an island, which is a little less than that of the circle that it is a polygon of
+/// (m).
+const RADII: [f64; 2] = [1.49, 200.0];
 /// Lanes within this distance of the island may be the ring's (m).
 pub(super) const NEAR: f64 = 7.5;
 /// Part of the angles around the island at which the nearest lane must circulate.

@@ -10,8 +10,6 @@ use crate::map::ground::{Ground, Hand, Line};
 /// Distance between two widths (m), and the widest middle (m).
 const STEP: f64 = 1.0;
 const WIDEST: f64 = 60.0;
-/// Beside a kerb, narrower gaps are closed by its gutter, and by who reads the map (m).
-const WIDE: f64 = 0.6;
 /// What is narrower is no gap (m).
 const LEAST: f64 = 0.01;
 
@@ -19,13 +17,18 @@ const LEAST: f64 = 0.01;
 pub(super) fn middles(seen: &Ground, hand: Hand, first: usize) -> Vec<Written> {
     let mut roads: Vec<Written> = Vec::new();
     for (index, arm) in seen.arms.iter().enumerate() {
-        let middle = nearest(seen, index).and_then(|(entry, exit)| {
+        let middle = nearest(seen, index).map_or_else(Vec::new, |(entry, exit)| {
             let line = entry.line.part(0.0, seen.ring_stations(&entry.line).0);
+            let way_in = Strip { line, width: entry.widths[0] };
             // A U-turn comes in on the entry's own line.
             let came_in = if exit.entry == index { seen.ring_stations(&exit.line).0 } else { 0.0 };
             let way_out = Strip { line: exit.line.part(came_in, exit.line.length()), width: exit.widths[2] };
             // The other carriageway is on the left of who keeps to the right.
-            Strip { line, width: entry.widths[0] }.up_to(&[&way_out.line], way_out.width, f64::from(-lane_id(hand)))
+            let side = f64::from(-lane_id(hand));
+            [(&way_in, &way_out), (&way_out, &way_in)]
+                .into_iter()
+                .filter_map(|(own, other)| own.beside(seen, other, side))
+                .collect()
         });
         let of_entry = lanes(seen.lines.iter().filter(|line| line.entry == index), |line| Strip {
             line: line.line.part(0.0, seen.ring_stations(&line.line).0),
@@ -36,15 +39,14 @@ pub(super) fn middles(seen: &Ground, hand: Hand, first: usize) -> Vec<Written> {
             line: line.line.part(seen.ring_stations(&line.line).1, line.line.length()).reversed(),
             width: line.widths[2],
         });
-        let kerbs: Vec<&Curve> = seen.faces.loops.iter().collect();
         let outwards = f64::from(lane_id(hand));
         let sides = [(&of_entry, "entry", outwards), (&of_exit, "exit", -outwards)];
         let beside = sides.into_iter().flat_map(|(lanes, name, outwards)| {
             let outermost = if outwards < 0.0 { lanes.first() } else { lanes.last() };
-            let to_kerb = outermost.and_then(|lane| lane.up_to(&kerbs, 0.0, outwards)).filter(Gap::is_wide);
+            let to_kerb = outermost.and_then(|lane| lane.up_to_gutter(seen, outwards));
             between(lanes).into_iter().chain(to_kerb).map(move |gap| (name, gap))
         });
-        for (name, gap) in middle.map(|gap| ("middle", gap)).into_iter().chain(beside) {
+        for (name, gap) in middle.into_iter().map(|gap| ("middle", gap)).chain(beside) {
             roads.push(gap.written(first + roads.len(), format!("{} {name}", arm.name)));
         }
     }
@@ -69,19 +71,43 @@ impl Strip {
     /// right, where it is -1; none where they touch everywhere.
     fn up_to(&self, others: &[&Curve], other_width: f64, side: f64) -> Option<Gap> {
         let (from, to) = (self.width / 2.0, other_width / 2.0);
-        let width = |s: f64| (across(&self.line, s, side, others) - from - to).max(0.0);
-        let samples: Vec<(f64, f64)> = stations(&self.line).map(|s| (s, width(s))).collect();
+        self.gap(side, |s| across(&self.line, s, side, others) - from - to)
+    }
+
+    /// What lies between this lane and the gutter of the nearest kerb on one of its sides; none where they touch
+    /// everywhere.
+    fn up_to_gutter(&self, seen: &Ground, side: f64) -> Option<Gap> {
+        self.gap(side, |s| self.to_gutter(seen, s, side))
+    }
+
+    /// What lies between this lane and another one on one of its sides, up to the gutter of what stands there; none
+    /// where they touch everywhere.
+    fn beside(&self, seen: &Ground, other: &Strip, side: f64) -> Option<Gap> {
+        let to_other = |s: f64| across(&self.line, s, side, &[&other.line]) - self.width / 2.0 - other.width / 2.0;
+        self.gap(side, |s| to_other(s).min(self.to_gutter(seen, s, side)))
+    }
+
+    /// Width between this lane and the gutter of the nearest kerb on one of its sides, at a station (m).
+    fn to_gutter(&self, seen: &Ground, s: f64, side: f64) -> f64 {
+        let out = side * DVec2::from_angle(self.line.heading_at(s)).perp();
+        let edge = self.line.point_at(s) + self.width / 2.0 * out;
+        let (mut width, mut room) = (0.0, f64::INFINITY);
+        while LEAST / 10.0 < room && width < WIDEST {
+            room = seen.to_gutter(edge + width * out);
+            width += room;
+        }
+        if width < WIDEST { width } else { 0.0 }
+    }
+
+    /// What lies beside this lane, of these widths by station (m); none where it is nothing.
+    fn gap(&self, side: f64, width: impl Fn(f64) -> f64) -> Option<Gap> {
+        let samples: Vec<(f64, f64)> = stations(&self.line).map(|s| (s, width(s).max(0.0))).collect();
         let is_gap = samples.iter().any(|(_, width)| LEAST < *width);
-        is_gap.then(|| Gap { line: self.line.clone(), offset: side * from, samples })
+        is_gap.then(|| Gap { line: self.line.clone(), offset: side * self.width / 2.0, samples })
     }
 }
 
 impl Gap {
-    /// Whether more than a gutter lies there.
-    fn is_wide(&self) -> bool {
-        self.samples.iter().any(|(_, width)| WIDE < *width)
-    }
-
     fn written(self, id: usize, name: String) -> Written {
         let lane = WrittenLane {
             id: if self.offset < 0.0 { -1 } else { 1 },
