@@ -53,6 +53,19 @@ pub struct Arm {
     pub bearing: f64,
 }
 
+impl Arm {
+    /// What its name must be.
+    pub(super) const NAMES: &str =
+        "1 to 20 letters and digits, and neither outer nor island: routes and kerbs are named after arms";
+
+    /// Whether it may have this name.
+    pub(super) fn may_be_named(name: &str) -> bool {
+        (1..=20).contains(&name.len())
+            && name.chars().all(|c| c.is_ascii_alphanumeric())
+            && !["outer", "island"].contains(&name)
+    }
+}
+
 /// A route from the end of its entry arm to the end of its exit arm.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Line {

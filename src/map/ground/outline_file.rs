@@ -185,10 +185,8 @@ impl Ground {
         reader.length("arm", written.arm.len(), 1..=8, "tables")?;
         let mut arms: Vec<Arm> = Vec::new();
         for (i, WrittenArm { name, bearing_deg }) in written.arm.into_iter().enumerate() {
-            let usual = !name.is_empty() && name.len() <= 20 && name.chars().all(|c| c.is_ascii_alphanumeric());
-            if !usual || arms.iter().any(|arm| arm.name == name) || ["outer", "island"].contains(&name.as_str()) {
-                let expected =
-                    "must be 1 to 20 letters and digits, unlike those of other arms, and neither outer nor island";
+            if !Arm::may_be_named(&name) || arms.iter().any(|arm| arm.name == name) {
+                let expected = format!("must differ from those of other arms, and be {}", Arm::NAMES);
                 return Err(reader.invalid(format!("arm[{i}].name"), format!("{name:?}"), expected));
             }
             let bearing =

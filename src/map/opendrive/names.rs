@@ -63,14 +63,8 @@ pub(in crate::map) fn named(bearings: &[f64], given: &[String], mirrored: bool) 
         ));
     }
     for (i, name) in names.iter().enumerate() {
-        if name.is_empty()
-            || 20 < name.len()
-            || !name.chars().all(|c| c.is_ascii_alphanumeric())
-            || names[..i].contains(name)
-        {
-            return Err(
-                "names must differ and be 1 to 20 letters and digits, because they are part of route names".into()
-            );
+        if !Arm::may_be_named(name) || names[..i].contains(name) {
+            return Err(format!("names must differ and be {}", Arm::NAMES));
         }
     }
     Ok(names.into_iter().zip(bearings).map(|(name, bearing)| Arm { name, bearing }).collect())

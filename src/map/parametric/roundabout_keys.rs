@@ -10,7 +10,7 @@ use super::corner::WrittenCorner;
 use super::ring::Ring;
 use crate::files::reader::{Error, Reader, shown};
 use crate::geometry::Bend;
-use crate::map::ground::Hand;
+use crate::map::ground::{self, Hand};
 use crate::map::route::Lane;
 
 /// The smallest radius of a bend in a lane; no vehicle follows a smaller one (m).
@@ -210,12 +210,9 @@ impl Written {
 impl WrittenArm {
     fn checked(self, reader: &Reader, index: usize, ring: &Ring) -> Result<Arm, Error> {
         let key = |name: &str| format!("arm[{index}].{name}");
-        if self.name.is_empty() || 20 < self.name.len() || !self.name.chars().all(|c| c.is_ascii_alphanumeric()) {
-            return Err(reader.invalid(
-                key("name"),
-                format!("{:?}", self.name),
-                "must be 1 to 20 letters and digits, because it is part of route names",
-            ));
+        if !ground::Arm::may_be_named(&self.name) {
+            let expected = format!("must be {}", ground::Arm::NAMES);
+            return Err(reader.invalid(key("name"), format!("{:?}", self.name), expected));
         }
         let bearing = reader.within(&key("bearing_deg"), self.bearing_deg, -360.0..=360.0, "deg")?.to_radians();
         let length = reader.within(&key("length"), self.length, ring.outer() + 10.0..=1000.0, "m")?;
