@@ -3,6 +3,7 @@
 
 mod drawing; // a DXF file
 
+use std::collections::HashSet;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -315,6 +316,7 @@ fn junctions(file: &Path, map: &Map) -> Result<(), Error> {
 /// Prints all warnings: about the map, and about the place that is chosen or else all its roundabouts.
 fn check(file: &Path, map: &Map, choice: &Choice) -> Result<(), Error> {
     let mut text = String::new();
+    let said: HashSet<&str> = map.warnings().collect();
     for warning in map.warnings() {
         let _ = writeln!(text, "{warning}");
     }
@@ -328,7 +330,7 @@ fn check(file: &Path, map: &Map, choice: &Choice) -> Result<(), Error> {
         match place {
             // What is said of the map's roads is said above.
             Ok(Imported { warnings, .. }) => {
-                for warning in warnings.iter().filter(|warning| !map.warnings().any(|said| said == **warning)) {
+                for warning in warnings.iter().filter(|warning| !said.contains(warning.as_str())) {
                     let _ = writeln!(text, "{warning}");
                 }
             }

@@ -129,7 +129,8 @@ impl Map {
 
     /// What is odd in the file, and what was done about it.
     pub fn warnings(&self) -> impl Iterator<Item = &str> {
-        self.records.warnings.iter().chain(&self.graph.warnings).map(String::as_str)
+        let of_file = self.records.warnings.iter().map(|warning| warning.text.as_str());
+        of_file.chain(self.graph.warnings.iter().map(String::as_str))
     }
 
     /// By what its header moves the map, x, y and z (m), then a turn (rad), where that is not nothing. It is not done:

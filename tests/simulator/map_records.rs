@@ -28,6 +28,26 @@ fn connections_of_a_junction_that_is_written_twice_count_together() {
 }
 
 #[test]
+fn a_ring_is_warned_of_its_own_roads_however_many_others_are_odd() {
+    let odd = "<road name=\"\" length=\"1\" id=\"ODD\" junction=\"-1\"><planView><geometry s=\"0\" x=\"300\" y=\"0\" \
+               hdg=\"0\" length=\"1\"><line/></geometry></planView></road>";
+    let others: String = (0..1500).map(|index| odd.replace("ODD", &format!("odd{index}"))).collect();
+    // Road 1 is odd in more ways than are told of one road.
+    let many = "<object type=\"trafficIsland\" s=\"0\" t=\"0\"/>".repeat(30);
+    let own = crate::map_kinds::in_road_1(&plain(), "</road>", &format!("<objects>{many}</objects></road>"));
+    let map = parsed(&own.replacen("<road ", &format!("{others}<road "), 1));
+    let of_road_1 = |warnings: &[String]| {
+        let own = warnings.iter().filter(|warning| warning.starts_with("road 1,") || warning.starts_with("road 1:"));
+        own.map(|warning| warning.contains("has more that is odd")).collect::<Vec<_>>()
+    };
+    assert_eq!(map.warnings().filter(|warning| warning.ends_with("has no lanes")).count(), 1500);
+    let all: Vec<String> = map.warnings().map(str::to_owned).collect();
+    let told = of_road_1(&all);
+    assert!(told.len() == 21 && told[20] && !told[..20].contains(&true), "{told:?}");
+    assert_eq!(of_road_1(&imported(&map).warnings), told);
+}
+
+#[test]
 fn what_is_not_read_is_warned_of_includes_links_along_a_road_and_further_links_of_a_lane() {
     let changed = |from: &str, to: &str| {
         let text = plain();

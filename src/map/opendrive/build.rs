@@ -175,7 +175,7 @@ impl Site<'_> {
         }));
         let uneven = tilt(map, network).into_iter().chain(bridges(map, network));
         routes.warnings.extend(uneven.map(|what| format!("{}: {what}", refused.place)));
-        routes.warnings.extend(map.records.warnings_around(network));
+        routes.warnings.extend(map.records.warnings_around(network).map(str::to_owned));
         let Lines { mut lines, warnings, .. } = routes;
         lines.sort_by_key(|line| (line.entry, line.lane == Lane::Right, line.exit));
         let kerbs = faces.loops.iter().map(|curve| kerb_of(curve, &arms)).collect();

@@ -10,7 +10,6 @@ use super::lanes::Strip;
 use super::links::{Contact, contacts};
 use super::records::{Kind, Records};
 use super::sections::SHORTEST;
-use super::source::MOST_WARNINGS;
 
 /// A joint that jumps further is not believed (m).
 const JUMP: f64 = 0.5;
@@ -148,7 +147,11 @@ impl Graph {
                 }
                 None => "no lane begins near, so it is left out".to_owned(),
             };
-            graph.warn(format!("{}: its link to {} {misfit}; {instead}", places.name(index), places.name(wrong[0])));
+            graph.warnings.push(format!(
+                "{}: its link to {} {misfit}; {instead}",
+                places.name(index),
+                places.name(wrong[0])
+            ));
         }
         // Many files say of a junction's lane where it comes from, but not of the lane before it where it leads.
         for (index, start) in ends.iter().enumerate() {
@@ -167,12 +170,6 @@ impl Graph {
             }
         }
         graph
-    }
-
-    fn warn(&mut self, warning: String) {
-        if self.warnings.len() < MOST_WARNINGS {
-            self.warnings.push(warning);
-        }
     }
 
     /// Joins lanes by place and heading where their roads or sections are linked and the file names no lane.
@@ -200,7 +197,7 @@ impl Graph {
                 let (from, to) = if follow { (index, other) } else { (other, index) };
                 if !self.next[from].contains(&to) {
                     self.next[from].push(to);
-                    self.warn(format!(
+                    self.warnings.push(format!(
                         "{}: has no link to a lane, and is joined to {}, which begins there",
                         places.name(from),
                         places.name(to)

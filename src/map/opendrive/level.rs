@@ -4,7 +4,6 @@ use roxmltree::Node;
 
 use super::records::{Cubic, Level, RoadRecord, active};
 use super::source::Source;
-use super::whole::LEVEL;
 use super::xml::{attribute, child, children};
 use crate::files::reader::Error;
 
@@ -38,13 +37,11 @@ impl Cubic {
     }
 }
 
-/// Where `a + b x + c x²` is 0; NaN where it is nowhere.
+/// Where `a + b x + c x²` is 0; not finite where it is nowhere.
 fn roots([a, b, c]: [f64; 3]) -> [f64; 2] {
-    if c == 0.0 {
-        return [-a / b, f64::NAN];
-    }
-    let root = (b * b - 4.0 * a * c).sqrt();
-    [(-b - root) / (2.0 * c), (-b + root) / (2.0 * c)]
+    // Without differences of two numbers that are nearly alike, as they are where c is all but 0.
+    let q = -0.5 * (b + (b * b - 4.0 * a * c).sqrt().copysign(b));
+    [q / c, a / q]
 }
 
 /// Every record with the stretch on which it holds, up to `end`.
@@ -69,10 +66,10 @@ impl Source<'_, '_> {
         let step = |pair: &[Cubic]| ((pair[1].factors[0] - pair[0].at(pair[1].start)).abs(), pair[1].start);
         let largest = elevation.windows(2).map(step).max_by(|one, other| one.0.total_cmp(&other.0));
         if let Some((step, s)) = largest.filter(|(step, _)| STEP < *step) {
-            self.warn(node, &format!("its elevation jumps by up to {step:.2} m, at s {s:.2} m; {LEVEL}"));
+            self.warn_of_level(node, &format!("its elevation jumps by up to {step:.2} m, at s {s:.2} m"));
         }
         if GRADE < grade {
-            self.warn(node, &format!("has a grade of {:.1} %; {LEVEL}", 100.0 * grade));
+            self.warn_of_level(node, &format!("has a grade of {:.1} %", 100.0 * grade));
         }
         Ok(Level { grade, crossfall: self.crossfall(node, road)?, elevation })
     }
@@ -97,7 +94,7 @@ impl Source<'_, '_> {
                 .fold(fall, f64::max);
         }
         if child(profile, "crossSectionSurface").is_some() {
-            self.warn(node, &format!("its crossSectionSurface is not read; {LEVEL}"));
+            self.warn_of_level(node, "its crossSectionSurface is not read");
         }
         // Shapes of one station follow each other across the road.
         let mut shapes: Vec<(f64, Cubic)> = Vec::new();
@@ -160,6 +157,11 @@ mod tests {
         assert!((hill.steepest(0.0, 10.0) - 0.105).abs() < 1e-12);
         // The hill's top lies at s = 80 m, 12.8 m high.
         assert!((hill.largest(0.0, 100.0) - 12.8).abs() < 1e-12);
+        // As good as a parabola: 0.25 high at s = 50 m.
+        for least in [1e-24, -1e-24, 1e-12, 0.0] {
+            let bow = Cubic { start: 0.0, factors: [0.0, 0.01, -0.000_1, least] };
+            assert!((bow.largest(0.0, 100.0) - 0.25).abs() < 1e-6);
+        }
         assert_eq!(Cubic { start: 3.0, factors: [-0.15, 0.0, 0.0, 0.0] }.largest(3.0, 9.0), 0.15);
     }
 }

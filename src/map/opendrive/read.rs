@@ -8,7 +8,7 @@ use roxmltree::{Document, Node, ParsingOptions};
 
 use super::Hand;
 use super::objects::islands;
-use super::records::{Connection, Level, Link, Records, RoadRecord};
+use super::records::{Concerns, Connection, Level, Link, Records, RoadRecord, Warning};
 use super::source::{LONGEST, Source};
 use super::xml::{attribute, child, children, line, shown};
 use crate::files::reader::{Error, Reader, shortened};
@@ -48,7 +48,7 @@ pub(super) fn records(file: &Path, text: &str, hand: Hand) -> Result<Records, Er
         )));
     }
     check_size(&document).map_err(malformed)?;
-    let mut source = Source { reader: Reader::of(file), document: &document, records: Records::default(), repeated: 0 };
+    let mut source = Source::new(Reader::of(file), &document);
     for node in children(root, "road") {
         let road = source.road(node)?;
         if source.records.by_id.contains_key(&road.id) {
@@ -88,14 +88,12 @@ pub(super) fn records(file: &Path, text: &str, hand: Hand) -> Result<Records, Er
     }
     let signals = root.descendants().filter(|node| node.has_tag_name("signal")).count();
     if 0 < signals {
-        source.records.warnings.push(format!("{signals} signals are not read"));
+        source.records.warnings.push(Warning::of_map(format!("{signals} signals are not read")));
     }
     let includes = root.descendants().filter(|node| node.has_tag_name("include")).count();
     if 0 < includes {
-        source
-            .records
-            .warnings
-            .push(format!("{includes} includes of other files are not read: put what they have here"));
+        let text = format!("{includes} includes of other files are not read: put what they have here");
+        source.records.warnings.push(Warning::of_map(text));
     }
     let mut records = source.records;
     if records.mirrored {
@@ -221,12 +219,11 @@ impl Source<'_, '_> {
         }
         let left = rules.iter().filter(|&&left| left).count();
         if 0 < left && left < rules.len() {
-            let both = format!(
+            let text = format!(
                 "{left} of {} roads have left-hand traffic, the others right-hand; most count for all",
                 rules.len()
             );
-            self.records.mixed_hands = Some(both.clone());
-            self.records.warnings.push(both);
+            self.records.warnings.insert(0, Warning { concerns: Concerns::EveryPlace, text });
         }
         rules.len() < 2 * left
     }

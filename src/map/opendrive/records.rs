@@ -204,6 +204,31 @@ pub(super) struct Connection {
     pub(super) direct: bool,
 }
 
+/// Whom a warning of a file concerns.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Concerns {
+    /// Who reads the whole map. Of a place the same is found where it is imported, or it does not matter there.
+    Map,
+    /// Who imports a place with the road of this id, too.
+    Road(String),
+    /// Who imports any place, too.
+    EveryPlace,
+}
+
+/// What is odd in a file, and what was done about it.
+#[derive(Debug, Clone)]
+pub(super) struct Warning {
+    pub(super) concerns: Concerns,
+    pub(super) text: String,
+}
+
+impl Warning {
+    /// One that concerns who reads the whole map.
+    pub(super) fn of_map(text: String) -> Warning {
+        Warning { concerns: Concerns::Map, text }
+    }
+}
+
 /// A map.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Records {
@@ -218,8 +243,6 @@ pub(super) struct Records {
     pub(super) offset: Option<[f64; 4]>,
     /// Lane types that are not known, with their numbers of lanes.
     pub(super) unknown_types: BTreeMap<String, usize>,
-    /// What is odd where some of its roads have left-hand traffic and others right-hand.
-    pub(super) mixed_hands: Option<String>,
     /// What is odd in the file, and what was done about it.
-    pub(super) warnings: Vec<String>,
+    pub(super) warnings: Vec<Warning>,
 }

@@ -1,15 +1,16 @@
 //! A document that is being read: numbers within bounds, and errors and warnings with road, lane and line.
 
-use roxmltree::{Document, Node};
+use roxmltree::{Document, Node, NodeId};
 
-use super::records::{Cubic, Records};
+use super::records::{Concerns, Cubic, Records, Warning};
+use super::whole::LEVEL;
 use super::xml::{attribute, line, shown};
 use crate::files::reader::{Error, Reader};
 
 /// Longest road (m).
 pub(super) const LONGEST: f64 = 100_000.0;
-/// Most warnings that are kept.
-pub(super) const MOST_WARNINGS: usize = 1000;
+/// Most warnings of one road or junction.
+const MOST_WARNINGS: usize = 20;
 
 /// A document that is being read.
 pub(super) struct Source<'a, 'i> {
@@ -18,6 +19,15 @@ pub(super) struct Source<'a, 'i> {
     pub(super) records: Records,
     /// Records of lanes that were repeated so far.
     pub(super) repeated: usize,
+    /// The road or junction that was last warned of, and how often.
+    warned: (Option<NodeId>, usize),
+}
+
+impl<'a, 'i> Source<'a, 'i> {
+    /// A document of which nothing is read yet.
+    pub(super) fn new(reader: Reader<'a>, document: &'a Document<'i>) -> Source<'a, 'i> {
+        Source { reader, document, records: Records::default(), repeated: 0, warned: (None, 0) }
+    }
 }
 
 impl Source<'_, '_> {
@@ -39,10 +49,28 @@ impl Source<'_, '_> {
         parts.join(", ")
     }
 
+    /// Warns of a node; the import of a place with its road repeats it.
     pub(super) fn warn(&mut self, node: Node, what: &str) {
-        if self.records.warnings.len() < MOST_WARNINGS {
-            self.records.warnings.push(format!("{}: {what}", self.place(node)));
-        }
+        let road = node.ancestors().find(|node| node.has_tag_name("road"));
+        let concerns = road.map_or(Concerns::Map, |road| Concerns::Road(attribute(road, "id").to_owned()));
+        self.note(node, what, concerns);
+    }
+
+    /// Warns of a road that is not level; the import of a place with it tells the largest of what its roads have.
+    pub(super) fn warn_of_level(&mut self, road: Node, what: &str) {
+        self.note(road, &format!("{what}; {LEVEL}"), Concerns::Map);
+    }
+
+    fn note(&mut self, node: Node, what: &str, concerns: Concerns) {
+        let whole = node.ancestors().take_while(|node| node.parent_element().is_some()).last().unwrap_or(node);
+        let n = if self.warned.0 == Some(whole.id()) { self.warned.1 + 1 } else { 1 };
+        self.warned = (Some(whole.id()), n);
+        let text = match n {
+            ..=MOST_WARNINGS => format!("{}: {what}", self.place(node)),
+            n if n == MOST_WARNINGS + 1 => format!("{}: has more that is odd", self.place(whole)),
+            _ => return,
+        };
+        self.records.warnings.push(Warning { concerns, text });
     }
 
     pub(super) fn invalid(&self, node: Node, key: &str, value: &str, expected: impl Into<String>) -> Error {

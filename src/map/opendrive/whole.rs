@@ -1,11 +1,10 @@
 //! What is seen of a map only when all of it was read: links that lead nowhere, both ways of direct junctions, roads
 //! far from the others.
 
-use std::collections::{BTreeSet, HashSet};
+use std::collections::HashSet;
 
 use super::paths::Network;
-use super::records::{Connection, Link, Records};
-use super::source::MOST_WARNINGS;
+use super::records::{Concerns, Connection, Link, Records, Warning};
 use super::xml::shown;
 use crate::files::reader::{Error, Reader};
 
@@ -24,8 +23,8 @@ impl Records {
         self.check_extent(reader)?;
         self.warn_of_missing();
         self.warn_of_tilt();
-        self.warnings.extend(self.unknown_lanes().map(|unknown| format!("{unknown}; nothing is driven on there")));
-        self.warnings.truncate(MOST_WARNINGS);
+        let unknown = self.unknown_lanes().map(|unknown| format!("{unknown}; nothing is driven on there"));
+        self.warnings.extend(unknown.map(Warning::of_map));
         self.turn_direct_connections();
         Ok(())
     }
@@ -42,18 +41,15 @@ impl Records {
         (!self.unknown_types.is_empty()).then(|| format!("lane types that are not known: {list}{more}"))
     }
 
-    /// What is odd in the file about the roads of a place, and about the hand of traffic. Links that lead nowhere,
-    /// grades and crossfalls are told of the place itself.
-    pub(super) fn warnings_around(&self, network: &Network) -> Vec<String> {
-        let roads: BTreeSet<usize> = network.strips.values().map(|strip| strip.road).collect();
-        let names: Vec<String> = roads.iter().map(|&road| format!("road {}", shown(&self.roads[road].id))).collect();
-        let is_told = |warning: &str| warning.ends_with(LEVEL) || warning.contains("is linked to");
-        let is_about = |warning: &str| {
-            let after = |name: &String| warning.strip_prefix(name.as_str());
-            names.iter().filter_map(after).any(|rest| rest.starts_with([':', ',']) && !is_told(rest))
+    /// What is odd in the file that concerns a place with these roads.
+    pub(super) fn warnings_around(&self, network: &Network) -> impl Iterator<Item = &str> {
+        let roads: HashSet<&str> = network.strips.values().map(|strip| self.roads[strip.road].id.as_str()).collect();
+        let concerned = move |warning: &&Warning| match &warning.concerns {
+            Concerns::Map => false,
+            Concerns::Road(id) => roads.contains(id.as_str()),
+            Concerns::EveryPlace => true,
         };
-        let of_roads = self.warnings.iter().filter(|warning| is_about(warning));
-        of_roads.chain(&self.mixed_hands).cloned().collect()
+        self.warnings.iter().filter(concerned).map(|warning| warning.text.as_str())
     }
 
     /// An error if a road begins too far from the others.
@@ -89,12 +85,13 @@ impl Records {
                 }
             }
         }
-        let warnings = missing.into_iter().take(MOST_WARNINGS).map(|(road, what, id)| {
+        let warnings = missing.into_iter().map(|(road, what, id)| {
             // Roads between may say themselves what they lead to, and a junction only lists them.
             let end = if what == "road" { "; it is a dead end" } else { "" };
             format!("road {}: is linked to {what} {}, which the file does not have{end}", shown(road), shown(id))
         });
-        self.warnings.extend(warnings.collect::<Vec<_>>());
+        let warnings: Vec<Warning> = warnings.map(Warning::of_map).collect();
+        self.warnings.extend(warnings);
     }
 
     /// Warns of the largest crossfall.
@@ -106,9 +103,9 @@ impl Records {
         };
         let (percent, roads, all) = (100.0 * most.level.crossfall, tilted.count(), self.roads.len());
         let largest = format!("up to {percent:.1} % on road {}", shown(&most.id));
-        self.warnings.push(format!(
+        self.warnings.push(Warning::of_map(format!(
             "{roads} of {all} roads have a crossfall (superelevation, crossfall, shape), {largest}; {LEVEL}"
-        ));
+        )));
     }
 
     /// A direct junction joins two roads without a road of its own: what it says of one of them holds for the other
