@@ -29,6 +29,7 @@ use crate::session::Session;
 use checkpointer::{Checkpointer, Written};
 use folder::Folder;
 use kept_policies::KeptPolicies;
+use metrics_file::MetricsFile;
 use progress::Progress;
 use route_counts::RouteCounts;
 use validation::Validation;
@@ -240,6 +241,11 @@ impl<'a> Run<'a> {
         let read =
             |bytes| Policy::from_bytes("best policy", bytes).expect("the bytes were made from a policy that drove");
         best.map_or_else(|| self.training.policy(), |bytes| Ok(read(bytes)))
+    }
+
+    /// Ends the run but for its lock: no other run continues it while the file is held.
+    pub fn into_metrics(self) -> MetricsFile {
+        self.progress.into_metrics()
     }
 
     /// Writes the last checkpoint, policy and row. Everything is tried before the first failure is returned.

@@ -226,7 +226,8 @@ impl Training {
             caller.tell(Event::Finished { folder: &folder, outcome: &outcome });
             return Ok(outcome);
         }
-        drop(run);
+        // Trucks and learner go; the lock is held until the report is written.
+        let _metrics = run.into_metrics();
         self.conclude(&folder, outcome, policy, caller, written)
     }
 

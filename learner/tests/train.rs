@@ -121,6 +121,29 @@ fn a_run_that_a_caller_stops_and_continues_equals_one_never_stopped() {
 }
 
 #[test]
+fn nobody_continues_a_run_that_is_still_evaluating_nor_touches_what_it_writes() {
+    let place = tempfile::tempdir().unwrap();
+    let folder = place.path().join("runs/mine");
+    let part = folder.join("checkpoint.part");
+    let refused: Mutex<Option<String>> = Mutex::default();
+    let was_told = AtomicBool::new(false);
+    let watcher = |event: Event| {
+        if matches!(event, Event::Evaluating { .. }) && !was_told.swap(true, Ordering::Relaxed) {
+            std::fs::write(&part, b"being written").unwrap();
+            let error = resume(&folder, None, Some(8000), DEAF, &AtomicBool::new(false)).unwrap_err();
+            *refused.lock().unwrap() = Some(error.to_string());
+        }
+    };
+    train(&small(place.path()), &folder, &watcher, &AtomicBool::new(false)).unwrap();
+    let message = refused.into_inner().unwrap().unwrap();
+    assert!(message.contains("metrics.csv: another run is writing it"), "{message}");
+    assert!(part.is_file());
+    let outcome = resume(&folder, None, Some(8000), DEAF, &AtomicBool::new(false)).unwrap();
+    assert_eq!(outcome.env_steps, 8000);
+    assert!(!part.exists());
+}
+
+#[test]
 fn a_run_under_a_rule_continues_under_it_and_its_report_names_it() {
     let place = tempfile::tempdir().unwrap();
     let report = check_continued(&under_a_rule(place.path()), place.path());

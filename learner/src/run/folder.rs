@@ -54,11 +54,10 @@ impl Folder {
         let _ = std::fs::remove_dir(&self.0);
     }
 
-    /// The folder of a run that continues. Temporary files of a killed process are removed.
+    /// The folder of a run that continues.
     pub fn of(path: &Path) -> Result<Folder, Error> {
         let folder = Folder(path.to_owned());
         if folder.config().is_file() {
-            let _ = std::fs::remove_file(folder.checkpoint_part());
             return Ok(folder);
         }
         let expected = "the folder of a run is needed, with the config.toml that it left".to_owned();
@@ -89,6 +88,11 @@ impl Folder {
     /// linked.
     pub fn checkpoint_part(&self) -> PathBuf {
         followed(&self.checkpoint()).with_extension("part")
+    }
+
+    /// Removes what a killed process has left half written. No run may be writing.
+    pub fn remove_parts(&self) {
+        let _ = std::fs::remove_file(self.checkpoint_part());
     }
 
     /// The policy, replaced in one move each time.

@@ -43,9 +43,10 @@ impl MetricsFile {
             Ok(_) => Error::write(&path)(error),
             Err(_) => Error::read(&path)(error),
         })?;
-        let metrics_file =
-            MetricsFile { length: file.metadata().map_err(Error::read(&path))?.len(), path, file, is_new: false };
+        let mut metrics_file = MetricsFile { length: 0, path, file, is_new: false };
         metrics_file.lock()?;
+        // A run that was still ending may have written rows until its lock was let go.
+        metrics_file.length = metrics_file.file.metadata().map_err(Error::read(&metrics_file.path))?.len();
         let mut head = String::new();
         BufReader::new(&metrics_file.file).read_line(&mut head).map_err(Error::read(&metrics_file.path))?;
         if head != HEAD {
@@ -123,7 +124,23 @@ impl MetricsFile {
 
 #[cfg(all(test, target_os = "linux"))]
 mod tests {
-    use super::MetricsFile;
+    use std::io::Write;
+
+    use super::{HEAD, MetricsFile};
+
+    #[test]
+    fn rows_that_a_run_writes_while_another_waits_for_its_lock_are_counted() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("metrics.csv");
+        std::fs::write(&path, HEAD).unwrap();
+        let mut ending = std::fs::OpenOptions::new().append(true).open(&path).unwrap();
+        ending.lock().unwrap();
+        let opened = std::thread::spawn(move || MetricsFile::open(path).unwrap());
+        std::thread::sleep(std::time::Duration::from_millis(100));
+        ending.write_all(b"a row\n").unwrap();
+        drop(ending);
+        assert_eq!(opened.join().unwrap().length(), HEAD.len() as u64 + 6);
+    }
 
     #[test]
     fn a_file_that_may_be_read_but_not_written_is_said_to_be_so_and_is_no_wrong_input() {

@@ -230,6 +230,11 @@ impl<'a> Progress<'a> {
         }
     }
 
+    /// The rows' file, whose lock keeps other runs out of the folder.
+    pub fn into_metrics(self) -> MetricsFile {
+        self.metrics
+    }
+
     /// Writes a row. Where that fails, its sums go into the next one.
     pub fn write_row(&mut self, entropy_coefficient: f32) {
         let written = self.append_row(entropy_coefficient);

@@ -31,7 +31,8 @@ pub struct Resumed {
 }
 
 impl Resumed {
-    /// Reads what a run left in its folder. Nothing is written but a missing `metrics.csv`.
+    /// Reads what a run left in its folder. Nothing is written but a missing `metrics.csv`; what a killed process left
+    /// half written is removed.
     pub fn open(path: &Path, minutes: Option<f64>, steps: Option<u64>) -> Result<Resumed, Error> {
         let folder = Folder::of(path)?;
         let has_new_budget = minutes.is_some() || steps.is_some();
@@ -49,6 +50,7 @@ impl Resumed {
         }
         let file = folder.metrics();
         let metrics = if file.is_file() { MetricsFile::open(file)? } else { MetricsFile::create(file)? };
+        folder.remove_parts();
         if !folder.checkpoint().is_file() {
             give_budget(&mut config, minutes, steps)?;
             return Ok(Resumed { folder, config, metrics, stored: None, has_new_budget });
