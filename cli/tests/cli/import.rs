@@ -84,6 +84,11 @@ fn flags_that_would_do_nothing_are_refused() {
     };
     refused(&["import", sumo, "--list", "--ring", "140,140"], "--ring");
     refused(&["import", sumo, "--junctions", "--arms", "E,N,W,S"], "--arms");
+    let outline = folder.path().join("ring.outline.toml");
+    let outline = outline.to_str().unwrap();
+    let said = "arms: [\"outer\", \"N\", \"W\", \"S\"]; names must differ";
+    refused(&["import", sumo, "--arms", "outer,N,W,S", "-o", outline], said);
+    refused(&["import", sumo, "--list", "--unit", "us-ft"], "--unit: us-ft; is for a drawing");
     let svg = svg.to_str().unwrap();
     refused(&["draw", "16m", "--ring", "1,2", "-o", svg], "--ring: 1,2");
     refused(&["draw", "16m", "--hand", "left", "-o", svg], "--hand: left");

@@ -2,7 +2,7 @@
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use offtrack::map::drawing::{self, Drawn, Layers, Unit, is_same_layer};
-use offtrack::map::opendrive::{Hand, Imported};
+use offtrack::map::opendrive::Imported;
 
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
@@ -46,7 +46,7 @@ impl DrawingArgs {
             ("--kerb-layer", self.kerb_layer.clone()),
             ("--lane-layer", self.lane_layer.clone()),
             ("--apron-layer", self.apron_layer.clone()),
-            ("--unit", self.unit.map(|unit| format!("{unit:?}").to_lowercase())),
+            ("--unit", self.unit.map(|unit| unit.name().to_owned())),
             ("--lane-width", self.lane_width.map(|width| format!("{width} m"))),
         ];
         let Some((name, Some(value))) = given.into_iter().find(|(_, value)| value.is_some()) else { return Ok(()) };
@@ -65,7 +65,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
         ("--junctions", args.junctions.then(|| "given".to_owned())),
         ("--check", args.check.then(|| "given".to_owned())),
         ("--way", args.place.ways.first().map(|way| format!("{},{}", way.from, way.to))),
-        ("--hand", (args.place.hand != Hand::Map).then(|| format!("{:?}", args.place.hand).to_lowercase())),
+        ("--hand", super::word(args.place.hand).map(str::to_owned)),
     ];
     if let Some((name, Some(value))) = flags.into_iter().find(|(_, value)| value.is_some()) {
         return Err(Error::Setting {

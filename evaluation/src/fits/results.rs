@@ -1,6 +1,6 @@
 //! The results of a folder: written as they are found, and continued by a later call that asks the same.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use offtrack::files::reader;
@@ -118,19 +118,18 @@ impl Results {
             ("clearance", found.asked.clearance.to_string(), self.asked.clearance.to_string()),
             ("gutter", format!("{:?}", found.asked.gutter), format!("{:?}", self.asked.gutter)),
             ("widths", format!("{:?}", found.asked.widths), format!("{:?}", self.asked.widths)),
-            ("inputs", format!("{:?}", found.inputs), format!("{:?}", self.inputs)),
-        ];
-        if let Some((key, there, here)) = differs.into_iter().find(|(_, there, here)| there != here) {
+        ]
+        .map(|(key, there, here)| (key.to_owned(), there, here));
+        let names: BTreeSet<&String> = found.inputs.keys().chain(self.inputs.keys()).collect();
+        let input = |inputs: &BTreeMap<String, String>, name| inputs.get(name).cloned().unwrap_or("none".to_owned());
+        let inputs =
+            names.into_iter().map(|name| (name.clone(), input(&found.inputs, name), input(&self.inputs, name)));
+        if let Some((key, there, here)) = differs.into_iter().chain(inputs).find(|(_, there, here)| there != here) {
             let message = format!("has results of another question: {key}: {there} there, {here} here; {other}");
             return Err(Error::contents(file, message));
         }
         self.rows = found.rows;
         Ok(())
-    }
-
-    /// Whether the answer for a route and a vehicle is there.
-    pub fn has(&self, route: &str, vehicle: &str) -> bool {
-        self.row(route, vehicle).is_some()
     }
 
     /// The answer for a route and a vehicle.
@@ -198,7 +197,7 @@ mod tests {
         let said = refused(Asked { clearance: 0.5, ..asked() }, "16m");
         assert!(said.contains("clearance: 0.3 there, 0.5 here"), "{said}");
         let said = refused(asked(), "20m");
-        assert!(said.contains("inputs") && said.contains("road 20m"), "{said}");
+        assert!(said.contains("road 16m: ") && said.contains(" there, none here; "), "{said}");
         std::fs::write(&file, "{}").unwrap();
         assert!(refused(asked(), "16m").contains("is not a file of `offtrack fits`"));
     }

@@ -48,7 +48,7 @@ impl Unit {
     ];
 
     /// Its word of a flag.
-    fn name(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         Unit::NAMED.iter().find(|(_, unit)| *unit == self).map_or("", |(name, _)| name)
     }
 
