@@ -63,6 +63,8 @@ pub enum ActionKind {
 
 crate::named! {
     /// The three disjoint sets of a benchmark's routes, by their keys in a benchmark file.
+    #[derive(serde::Serialize, serde::Deserialize)]
+    #[serde(rename_all = "snake_case")]
     pub enum Split {
         /// Routes for training.
         Train = "train",

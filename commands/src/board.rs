@@ -96,8 +96,8 @@ fn row(args: &Args, file: &Path, entry: &Entry) -> Result<Row, Error> {
     let mut claims = String::new();
     let mut differs = Vec::new();
     let mut stretch = |key: &str, drive: &Drive| -> Result<Stretch, Error> {
-        let (scenario, split) = driver.scenario(drive)?;
-        let outcomes = driver.driven(&scenario, split, drive)?;
+        let scenario = driver.scenario(drive)?;
+        let outcomes = driver.driven(&scenario, drive)?;
         match &drive.claim {
             Some(claim) => differs.extend(claim.differs(&outcomes).map(|what| format!("{key}: {what}"))),
             None if args.claim => claims += &Claim::toml(key, &outcomes),
@@ -117,9 +117,9 @@ fn row(args: &Args, file: &Path, entry: &Entry) -> Result<Row, Error> {
         Some(seed) => {
             let scenario = driver.on_roads(seed, args.roads)?;
             let episodes = usual_episodes(scenario.split(Split::Test).len());
-            let drive = Drive { split: Split::Test.name().into(), episodes, claim: None, ..entry.home.clone() };
+            let drive = Drive { split: Split::Test, episodes, claim: None, ..entry.home.clone() };
             let benchmark = format!("{} on {} roads of wide/{seed}", drive.benchmark, args.roads);
-            Some(Stretch { benchmark, ..Stretch::of(&drive, &driver.driven(&scenario, Split::Test, &drive)?) })
+            Some(Stretch { benchmark, ..Stretch::of(&drive, &driver.driven(&scenario, &drive)?) })
         }
         None => None,
     };
@@ -134,14 +134,13 @@ struct Driver<'a> {
 
 impl Driver<'_> {
     /// The benchmark, with the routes of the split alone.
-    fn scenario(&self, drive: &Drive) -> Result<(Scenario, Split), Error> {
-        let split = Split::ALL.into_iter().find(|split| split.name() == drive.split).unwrap_or(Split::Test);
-        Ok((roads::asked(&self.entry.asked(self.file, drive), split)?, split))
+    fn scenario(&self, drive: &Drive) -> Result<Scenario, Error> {
+        roads::asked(&self.entry.asked(self.file, drive), drive.split)
     }
 
     /// The benchmark at home on random roads of a seed, with all their routes.
     fn on_roads(&self, seed: u32, n_roads: u32) -> Result<Scenario, Error> {
-        let (home, _) = self.scenario(&self.entry.home)?;
+        let home = self.scenario(&self.entry.home)?;
         let road = |index: u32| procedural::find(&format!("wide/{seed}/{index}"));
         let mut scenario = home.on(road(0)?)?;
         for index in 1..n_roads {
@@ -150,9 +149,9 @@ impl Driver<'_> {
         Ok(scenario)
     }
 
-    fn driven(&self, scenario: &Scenario, split: Split, drive: &Drive) -> Result<Outcomes, Error> {
+    fn driven(&self, scenario: &Scenario, drive: &Drive) -> Result<Outcomes, Error> {
         let (world, device) = (roads::world(scenario)?, Device::processor());
-        let &Drive { episodes, seed, .. } = drive;
+        let &Drive { split, episodes, seed, .. } = drive;
         let n_episodes = scenario.split(split).len() * episodes;
         let mut policy = self.policy(scenario, &world, &device, drive, n_episodes)?;
         let evaluation = Evaluation { scenario, world: &world, split, episodes, seed, record: false, device: &device };

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use offtrack::scenario::{Scenario, Split};
+use offtrack::scenario::Scenario;
 use offtrack::world::World;
-use offtrack_evaluation::comparison::{Asked, Comparison, Evaluated, Side};
+use offtrack_evaluation::comparison::{Asked, Comparison, Side};
 use offtrack_evaluation::device::Device;
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::page::comparison::{ComparisonPage, MOST_PAIRS, Pair};
@@ -111,13 +111,9 @@ fn write_page(file: &Path, sides: &[Side], comparison: &Comparison, policies: &[
 /// What the first file of a side was driven in.
 fn driven_in(side: &Side) -> Result<(Scenario, Arc<World>), Error> {
     let (_, evaluated) = &side.files[0];
-    let scenario = roads::asked(&evaluated.asked, split(evaluated))?;
+    let scenario = roads::asked(&evaluated.asked, evaluated.split)?;
     let world = roads::world(&scenario)?;
     Ok((scenario, world))
-}
-
-fn split(evaluated: &Evaluated) -> Split {
-    Split::ALL.into_iter().find(|split| split.name() == evaluated.split).unwrap_or(Split::Test)
 }
 
 /// Drives the first file of a side again and records these episodes.
@@ -138,7 +134,7 @@ fn driven(
     let evaluation = Evaluation {
         scenario,
         world,
-        split: split(evaluated),
+        split: evaluated.split,
         episodes: evaluated.outcomes.episodes,
         seed,
         record: false,

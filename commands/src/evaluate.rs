@@ -39,8 +39,8 @@ pub struct Args {
     #[arg(long, default_value = "attard2023")]
     benchmark: String,
     /// Which routes: `test` (unseen in training), `validation` or `train`.
-    #[arg(long, default_value = "test", value_parser = ["test", "validation", "train"])]
-    split: String,
+    #[arg(long, default_value = "test", value_parser = roads::split())]
+    split: Split,
     /// Only this route of the split, 20m/N-left-4, or all of a roundabout's, 20m; repeatable. A random road need not be
     /// in the benchmark: wide/7/12/S-left-3, or all of wide/7/12.
     #[arg(long)]
@@ -144,7 +144,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     )?;
     args.films.as_deref().map(check_no_films).transpose()?;
     let device = args.device.open()?;
-    let split = Split::ALL.into_iter().find(|split| split.name() == args.split).unwrap_or(Split::Test);
+    let split = args.split;
     let asked = args.policy.asked(&args.benchmark, args.load.as_deref(), &args.route);
     let scenario = roads::asked(&asked, split)?;
     let world = roads::world(&scenario)?;

@@ -3,13 +3,14 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use offtrack::files::cache::{Cache, Loading, Progress};
 use offtrack::files::reader::shortened;
-use offtrack::files::shipped::Kind;
 use offtrack::map::Road;
 use offtrack::map::chosen::is_map;
 use offtrack::map::drawing::is_drawing;
 use offtrack::map::procedural;
+use offtrack::map::route::is_of;
 use offtrack::scenario::{Place, Scenario, Split};
 use offtrack::world::World;
 use offtrack_evaluation::comparison::Asked;
@@ -27,6 +28,12 @@ const LONGEST_LIST: usize = 600;
 /// A benchmark by its name or path. What is known of random roads is kept in the user's cache.
 pub fn benchmark(name: &str) -> Result<Scenario, Error> {
     Ok(loading("drawing", |loading| Scenario::load(name, loading))?)
+}
+
+/// What a flag that names a split takes.
+pub fn split() -> impl TypedValueParser<Value = Split> {
+    let names = [Split::Test, Split::Validation, Split::Train].map(Split::name);
+    PossibleValuesParser::new(names).try_map(|name| Split::named(&name).ok_or("is no split"))
 }
 
 /// The benchmark that an evaluation was asked for, with the routes of its split alone.
@@ -86,7 +93,7 @@ pub fn narrow(scenario: &mut Scenario, flag: &'static str, names: &[String], spl
             let expected = format!("is not in the split asked for: give --split {}", split.name());
             return Err(Error::Setting { name: flag, value: name.clone(), expected });
         }
-        let (road, route) = road_of(name).ok_or_else(|| unknown(scenario, flag, name))?;
+        let (road, route) = procedural::road_of(name).ok_or_else(|| unknown(scenario, flag, name))?;
         if scenario.places.iter().any(|place| place.roundabout.name == road) {
             return Err(unknown(scenario, flag, name));
         }
@@ -144,25 +151,9 @@ pub fn keep(scenario: &mut Scenario, split: Split, benchmark: &str) -> Result<()
     Ok(())
 }
 
-/// Whether `name` is this route or its roundabout.
-fn is_of(route: &str, name: &str) -> bool {
-    route == name || route.rsplit_once('/').is_some_and(|(roundabout, _)| roundabout == name)
-}
-
 /// A route's name within its roundabout.
 fn short(route: &str) -> &str {
     route.rsplit('/').next().unwrap_or(route)
-}
-
-/// The road and, if it names one, the route within it that a name means apart from any benchmark.
-fn road_of(name: &str) -> Option<(&str, Option<&str>)> {
-    let is_road = |name: &str| {
-        procedural::address(name).is_some()
-            || Kind::Roundabout.names().any(|known| known == name)
-            || name.ends_with(".toml")
-    };
-    let split = || name.rsplit_once('/').filter(|(road, _)| is_road(road)).map(|(road, route)| (road, Some(route)));
-    if is_road(name) { Some((name, None)) } else { split() }
 }
 
 /// The error for a name that no route has. It lists the routes of the roundabout that the name begins with, or one of

@@ -138,7 +138,7 @@ fn printed(parts: &[Part]) -> Result<(), Error> {
 /// A benchmark with the routes asked for, baked.
 fn ground(name: &str, args: &Args) -> Result<Ground, Error> {
     let mut scenario = roads::benchmark(name)?;
-    let split = Split::ALL.into_iter().find(|split| split.name() == args.split);
+    let split = Split::named(&args.split);
     if !args.road.is_empty() {
         let splits = split.map_or(Split::ALL.to_vec(), |split| vec![split]);
         roads::narrow(&mut scenario, "--road", &args.road, &splits)?;

@@ -8,6 +8,7 @@ mod side;
 mod tables;
 
 use offtrack::layout::Ended;
+use offtrack::scenario::Split;
 use serde::Serialize;
 
 use crate::episode::wilson;
@@ -192,8 +193,8 @@ impl Differing {
 pub struct Comparison {
     /// The benchmark's name.
     pub benchmark: String,
-    /// `train`, `validation` or `test`.
-    pub split: String,
+    /// The routes that are driven.
+    pub split: Split,
     /// Seed of the starts.
     pub seed: u32,
     /// Number of routes.
@@ -213,7 +214,7 @@ impl Comparison {
         let (evaluated, outcomes) = (&first.files[0].1, first.outcomes(0));
         Comparison {
             benchmark: evaluated.benchmark.clone(),
-            split: evaluated.split.clone(),
+            split: evaluated.split,
             seed: evaluated.seed,
             routes: outcomes.routes.len(),
             episodes: outcomes.episodes,

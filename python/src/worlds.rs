@@ -19,7 +19,6 @@ use pyo3::prelude::*;
 
 use crate::errors::{self, ScenarioError};
 use routes::RoadFile;
-pub use routes::is_of;
 
 /// Most worlds that are kept for the next batch.
 const KEPT: usize = 8;

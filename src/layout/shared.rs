@@ -172,6 +172,11 @@ pub trait Named: Copy + Eq + std::fmt::Debug + 'static {
 
     /// The item's index in [`Named::ALL`].
     fn index(self) -> usize;
+
+    /// The one with this name.
+    fn named(name: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|known| known.name() == name)
+    }
 }
 
 /// An enum that is a closed list of names, see [`Named`](crate::layout::shared::Named).
@@ -193,6 +198,11 @@ macro_rules! named {
                 match self {
                     $($list::$item => $name,)*
                 }
+            }
+
+            /// The one with this name.
+            pub fn named(name: &str) -> Option<$list> {
+                <$list as $crate::layout::shared::Named>::named(name)
             }
         }
 

@@ -15,6 +15,7 @@ mod rules;
 mod tests;
 
 use crate::files::reader::Error;
+use crate::files::shipped::Kind;
 use crate::map::parametric::written::Written;
 use crate::map::{Gutter, Road};
 
@@ -168,4 +169,14 @@ pub fn address(name: &str) -> Option<(&str, u32, u32)> {
     let (rest, index) = name.rsplit_once('/')?;
     let (distribution, seed) = rest.rsplit_once('/')?;
     (!distribution.is_empty()).then_some((distribution, number(seed)?, number(index)?))
+}
+
+/// The road and, if it names one, the route within it that a name means apart from any benchmark: a random road, a
+/// shipped one, or that of a file; `None` for any other name.
+pub fn road_of(name: &str) -> Option<(&str, Option<&str>)> {
+    let is_road = |name: &str| {
+        address(name).is_some() || Kind::Roundabout.names().any(|known| known == name) || name.ends_with(".toml")
+    };
+    let split = || name.rsplit_once('/').filter(|(road, _)| is_road(road)).map(|(road, route)| (road, Some(route)));
+    if is_road(name) { Some((name, None)) } else { split() }
 }

@@ -8,6 +8,12 @@ use glam::DVec2;
 use crate::files::reader::shown;
 use crate::geometry::Curve;
 
+/// Whether a name means the route of this name: it is the route's own, its road's, or that of the distribution, or of its
+/// seed, that the road was drawn from.
+pub fn is_of(route: &str, name: &str) -> bool {
+    route.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
+}
+
 /// A lane of a carriageway or of the ring, counted from the kerb.
 ///
 /// Left and right are those of the world that is driven, where traffic keeps to the right. On a road with left-hand
@@ -134,4 +140,16 @@ pub fn waypoints(centre_line: &Curve, spacing: f64) -> Vec<Waypoint> {
     let whole = ((length - 1e-3) / spacing).floor() as usize;
     let stations = (0..=whole).map(|index| index as f64 * spacing).chain([length]);
     stations.map(|s| Waypoint { position: centre_line.point_at(s), heading: centre_line.heading_at(s) }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_of;
+
+    #[test]
+    fn a_route_goes_by_its_own_name_its_roads_and_that_of_what_the_road_was_drawn_from() {
+        let of = |name: &str| is_of("wide/7/12/S-left-3", name);
+        assert!(["wide/7/12/S-left-3", "wide/7/12", "wide/7", "wide"].into_iter().all(of));
+        assert!(!["wide/7/1", "wide/7/12/S-left", "wide/7/12/S-left-30", "7/12"].into_iter().any(of));
+    }
 }

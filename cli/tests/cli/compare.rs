@@ -91,6 +91,11 @@ fn evaluations_of_other_starts_and_reports_without_outcomes_are_refused_by_file_
     let shipped = "policy/shipped/attard2023/report.json";
     let said = refusal(&offtrack(&["compare", &a, shipped]), 2);
     assert!(said.contains(shipped) && said.contains("is the report of a training run"), "{said}");
+    let mut misspelt = place.json("a.json");
+    misspelt["split"] = json!("tset");
+    std::fs::write(&b, misspelt.to_string()).unwrap();
+    let said = refusal(&offtrack(&["compare", &b, &b]), 2);
+    assert!(said.contains("b.json: unknown variant `tset`, expected one of `train`, `validation`, `test`"), "{said}");
     let mut before = place.json("a.json");
     before.as_object_mut().unwrap().remove("outcomes");
     std::fs::write(&b, before.to_string()).unwrap();

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use offtrack::files::reader::{self, Reader, printable, shortened};
+use offtrack::scenario::Split;
 use serde::Deserialize;
 
 use crate::comparison::Asked;
@@ -54,9 +55,9 @@ pub struct Training {
 pub struct Drive {
     /// The benchmark's name, or its file beside the entry.
     pub benchmark: String,
-    /// `train`, `validation` or `test`.
+    /// The routes that are driven.
     #[serde(default = "test")]
-    pub split: String,
+    pub split: Split,
     /// Seed of the starts.
     #[serde(default)]
     pub seed: u32,
@@ -66,8 +67,8 @@ pub struct Drive {
     pub claim: Option<Claim>,
 }
 
-fn test() -> String {
-    "test".to_owned()
+fn test() -> Split {
+    Split::Test
 }
 
 /// What an evaluation comes to, to the last bit.
@@ -114,12 +115,8 @@ impl Entry {
             reader.count("training.cores", cores as usize, 1..=1_000_000)?;
         }
         for (key, drive) in [("home", Some(&entry.home)), ("elsewhere", entry.elsewhere.as_ref())] {
-            let Some(Drive { split, episodes, claim, .. }) = drive else { continue };
+            let Some(Drive { episodes, claim, .. }) = drive else { continue };
             reader.count(&format!("{key}.episodes"), *episodes, 1..=100_000)?;
-            if !["train", "validation", "test"].contains(&split.as_str()) {
-                let key = format!("{key}.split");
-                return Err(reader.invalid(key, split, "must be `train`, `validation` or `test`").into());
-            }
             let unknown = |letters: &String| letters.chars().any(|letter| end_of(letter).is_none());
             let wrong = claim.iter().flat_map(|claim| &claim.ends).find(|(_, letters)| unknown(letters));
             if let Some((route, letters)) = wrong {
@@ -271,7 +268,7 @@ pub(super) mod tests {
         refused(&ENTRY.replace("policy = \"pursuit\"\n", ""), "policy: missing; `policy` or `actions` is needed");
         refused(&ENTRY.replace("[home]", "actions = \"b\"\n[home]"), "policy: pursuit; leave it out, or `actions`");
         refused(&ENTRY.replace("episodes = 2", "episodes = 0"), "home.episodes: 0; must lie in 1..100000");
-        refused(&(ENTRY.to_owned() + "split = \"all\"\n"), "home.split: all; must be `train`");
+        refused(&(ENTRY.to_owned() + "split = \"all\"\n"), "unknown variant `all`, expected one of `train`");
         refused(&(ENTRY.to_owned() + "stars = 5\n"), "stars");
         let claim = "[home.claim]\ndigest = \"\"\narrived = 0\nends = { a = \"x\" }\n";
         refused(&(ENTRY.to_owned() + claim), "home.claim.ends.a: x; must be letters");

@@ -1,6 +1,7 @@
 //! The board's table, for people and for programs.
 
 use offtrack::layout::Ended;
+use offtrack::scenario::Split;
 use serde::Serialize;
 
 use super::entry::{Drive, Entry, Training};
@@ -16,8 +17,8 @@ use crate::tabular;
 pub struct Stretch {
     /// The benchmark's name.
     pub benchmark: String,
-    /// `train`, `validation` or `test`.
-    pub split: String,
+    /// The routes that are driven.
+    pub split: Split,
     /// Episodes on each route.
     pub episodes: usize,
     /// Seed of the starts.
@@ -61,7 +62,7 @@ impl Stretch {
         let (success_low, success_high) = wilson(arrived, success.episodes());
         Stretch {
             benchmark: drive.benchmark.clone(),
-            split: drive.split.clone(),
+            split: drive.split,
             episodes: drive.episodes,
             seed: drive.seed,
             starts: success.episodes(),
@@ -152,7 +153,8 @@ impl Board {
     pub fn markdown(&self) -> String {
         let tables = self.rows.chunk_by(|a, b| is_same(&a.home, &b.home)).map(|rows| {
             let Stretch { benchmark, split, episodes, seed, .. } = &rows[0].home;
-            let heading = format!("{benchmark}, {split} routes, {episodes} episodes each, seed {seed} of the starts");
+            let heading =
+                format!("{benchmark}, {} routes, {episodes} episodes each, seed {seed} of the starts", split.name());
             format!("{heading}\n\n{}", tabular::markdown(&cells(rows)))
         });
         tables.collect::<Vec<_>>().join("\n")
@@ -193,7 +195,7 @@ impl Board {
                 name,
                 file,
                 home.benchmark,
-                home.split,
+                home.split.name().to_owned(),
                 home.episodes.to_string(),
                 home.success.mean.to_string(),
                 home.success_low.to_string(),

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use offtrack::files::reader;
 use offtrack::layout::Ended;
+use offtrack::scenario::Split;
 use serde::{Deserialize, Serialize};
 
 use super::Figure;
@@ -42,8 +43,8 @@ pub struct Asked {
 pub struct Evaluated {
     /// The benchmark's name.
     pub benchmark: String,
-    /// `train`, `validation` or `test`.
-    pub split: String,
+    /// The routes that are driven.
+    pub split: Split,
     /// Name of the policy.
     pub policy: String,
     /// Seed of the starts.
@@ -88,7 +89,7 @@ impl Evaluated {
         let [own, others] = [self, other].map(|evaluated| &evaluated.outcomes);
         let texts = [
             ("benchmark", self.benchmark.clone(), other.benchmark.clone()),
-            ("split", self.split.clone(), other.split.clone()),
+            ("split", self.split.name().to_owned(), other.split.name().to_owned()),
             ("seed", self.seed.to_string(), other.seed.to_string()),
             ("episodes on each route", own.episodes.to_string(), others.episodes.to_string()),
             ("routes", own.routes.len().to_string(), others.routes.len().to_string()),

@@ -146,7 +146,7 @@ impl Comparison {
 
     pub(crate) fn heading(&self) -> String {
         let Comparison { benchmark, split, seed, routes, episodes, .. } = self;
-        format!("{benchmark}, {split} routes: {routes}, {episodes} episodes each, seed {seed} of the starts")
+        format!("{benchmark}, {} routes: {routes}, {episodes} episodes each, seed {seed} of the starts", split.name())
     }
 
     /// The tables, with at most `most` rows of single routes and roundabouts.

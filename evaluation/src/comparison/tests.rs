@@ -8,7 +8,7 @@ fn evaluated(routes: &[&str]) -> Evaluated {
     let asked =
         Asked { benchmark: "b".into(), policy: None, look_ahead: None, line: None, load: None, route: Vec::new() };
     let policy = "p".to_owned();
-    Evaluated { benchmark: "b".into(), split: "test".into(), policy, seed: 0, asked, outcomes: outcomes(routes) }
+    Evaluated { benchmark: "b".into(), split: Split::Test, policy, seed: 0, asked, outcomes: outcomes(routes) }
 }
 
 fn side(name: &str, files: &[&[&str]]) -> Side {

@@ -22,10 +22,7 @@ pub struct AlsoEvaluate {
 impl AlsoEvaluate {
     /// What `text` names; none if it is neither a name nor a path with or without a split.
     fn of(text: &str) -> Option<AlsoEvaluate> {
-        let named = text.rsplit_once('/').and_then(|(benchmark, word)| {
-            let split = Split::ALL.into_iter().find(|split| split.name() == word)?;
-            Some((benchmark, split))
-        });
+        let named = text.rsplit_once('/').and_then(|(benchmark, word)| Some((benchmark, Split::named(word)?)));
         let (benchmark, split) = named.unwrap_or((text, Split::Test));
         let is_name = !benchmark.is_empty() && !benchmark.contains(['/', '\\']);
         (is_name || benchmark.ends_with(".toml")).then(|| AlsoEvaluate { benchmark: benchmark.to_owned(), split })

@@ -79,7 +79,7 @@ pub(super) fn policy(name: &str, description: Description, tensors: Tensors) -> 
 
 /// One of a list of names.
 fn word<T: Named>(key: &str, word: &str) -> Result<T, String> {
-    T::ALL.iter().copied().find(|known| known.name() == word).ok_or_else(|| {
+    T::named(word).ok_or_else(|| {
         let known: Vec<&str> = T::ALL.iter().map(|known| known.name()).collect();
         format!("is a policy with {key} {word:?}; must be {}", known.join(" or "))
     })

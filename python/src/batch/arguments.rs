@@ -11,8 +11,7 @@ use pyo3::prelude::*;
 pub(super) const CPU: &str = "cpu";
 
 pub(super) fn column_of(name: &str) -> PyResult<Column> {
-    let found = Column::ALL.iter().find(|column| column.name() == name);
-    found.copied().ok_or_else(|| {
+    Column::named(name).ok_or_else(|| {
         let known: Vec<&str> = Column::ALL.iter().map(|column| column.name()).collect();
         PyValueError::new_err(format!("column: {name:?}; must be one of {}", known.join(", ")))
     })

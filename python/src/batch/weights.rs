@@ -1,9 +1,10 @@
 //! Weights of routes: how often each is drawn.
 
+use offtrack::map::route::is_of;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::worlds::{Place, is_of};
+use crate::worlds::Place;
 
 /// Least entries of a table of routes: weights count to one in so many.
 const ENTRIES: usize = 4096;

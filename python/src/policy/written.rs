@@ -231,7 +231,7 @@ fn vector(array: &PyReadonlyArray1<f32>) -> PyResult<Vec<f32>> {
 
 /// One of a list of names.
 fn word<T: Named>(key: &str, word: &str) -> PyResult<T> {
-    T::ALL.iter().copied().find(|known| known.name() == word).ok_or_else(|| {
+    T::named(word).ok_or_else(|| {
         let known: Vec<&str> = T::ALL.iter().map(|known| known.name()).collect();
         PyValueError::new_err(format!("{key}: {word:?}; must be one of {}", known.join(", ")))
     })

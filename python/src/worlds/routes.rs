@@ -4,8 +4,8 @@ use std::fs;
 use std::path::PathBuf;
 
 use offtrack::files::reader::shortened;
-use offtrack::files::shipped::Kind;
 use offtrack::map::procedural;
+use offtrack::map::route::is_of;
 use offtrack::scenario::{Scenario, Split};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -37,7 +37,7 @@ impl RoadFile {
     /// the same file.
     pub fn renamed(&self, name: &str) -> Option<String> {
         let of_same_file = || {
-            let road = road_of(name)?;
+            let (road, _) = procedural::road_of(name)?;
             let is_same = self.file.is_some() && fs::canonicalize(road).ok() == self.file;
             is_same.then(|| &name[road.len()..])
         };
@@ -53,7 +53,7 @@ pub fn narrow(
     split: &str,
     names: Option<&[String]>,
 ) -> PyResult<(&'static str, Vec<RoadFile>)> {
-    let Some(split) = Split::ALL.into_iter().find(|known| known.name() == split) else {
+    let Some(split) = Split::named(split) else {
         let known = Split::ALL.map(Split::name).join(", ");
         return Err(PyValueError::new_err(format!("split: {split:?}; must be one of {known}")));
     };
@@ -79,8 +79,8 @@ pub fn narrow(
     let of_benchmark = known(scenario);
     let (mut added, mut files): (Vec<&str>, Vec<RoadFile>) = Default::default();
     for name in names {
-        let road = match road_of(name) {
-            Some(road) if !of_benchmark.iter().any(|route| is_of(route, name)) => road,
+        let road = match procedural::road_of(name) {
+            Some((road, _)) if !of_benchmark.iter().any(|route| is_of(route, name)) => road,
             _ => continue,
         };
         if added.contains(&road) || scenario.places.iter().any(|place| place.roundabout.name == road) {
@@ -118,19 +118,4 @@ pub fn narrow(
 
 fn known(scenario: &Scenario) -> Vec<String> {
     scenario.routes().map(|(_, route)| route.name.clone()).collect()
-}
-
-/// Whether `name` is this route or its roundabout.
-pub fn is_of(route: &str, name: &str) -> bool {
-    route == name || route.strip_prefix(name).is_some_and(|rest| rest.starts_with('/'))
-}
-
-/// The road that a name of it or of one of its routes means apart from any benchmark.
-fn road_of(name: &str) -> Option<&str> {
-    let is_road = |name: &str| {
-        procedural::address(name).is_some()
-            || Kind::Roundabout.names().any(|known| known == name)
-            || name.ends_with(".toml")
-    };
-    if is_road(name) { Some(name) } else { name.rsplit_once('/').map(|(road, _)| road).filter(|road| is_road(road)) }
 }
