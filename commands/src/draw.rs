@@ -53,8 +53,7 @@ pub struct Args {
     #[arg(short, long, verbatim_doc_comment)]
     output: PathBuf,
     /// Draw the swept path on this route: N-left-3, or 16m/N-left-3. JSON then lists this route alone. Lock, steer
-    /// rate,
-    /// tyres and rollover are compared with what the path needs, and printed.
+    /// rate, tyres and rollover are compared with what the path needs, and printed.
     #[arg(long)]
     route: Option<String>,
     /// Draw the paths of cars and where those from different arms meet, as `traffic` drives them; not as JSON.

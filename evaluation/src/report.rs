@@ -19,8 +19,7 @@ pub struct RouteReport {
     /// `20m/N-left-3` and the like.
     pub name: String,
     /// A truck whose front axle follows the centre line touches no kerb, and its lock allows that. Steer rate, tyres
-    /// and
-    /// rollover are not asked: they depend on the speed, which is the policy's.
+    /// and rollover are not asked: they depend on the speed, which is the policy's.
     pub own_lane_suffices: bool,
     /// Radius of the roundabout's island (m); `None` on a crossing.
     pub island_radius: Option<f64>,

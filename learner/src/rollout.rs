@@ -63,8 +63,7 @@ pub trait Rollout {
     fn step(&mut self, actor: &Actor, env_steps: u64) -> Result<(), Error>;
 
     /// A refinement's steps of every truck with actions sampled from the actor's distribution, for learning from them
-    /// at
-    /// once: not remembered. The lane distance counts as far as the world's limit.
+    /// at once: not remembered. The lane distance counts as far as the world's limit.
     fn collect(&mut self, actor: &Mlp, settings: &Refinement) -> Result<Steps, Error>;
 
     /// One step of every truck with actions sampled from the actor's distribution, not kept at all.

@@ -17,8 +17,7 @@ create_exception!(
 );
 
 /// Does `work`. A panic in it is a bug on this side of the border: it becomes a `RuntimeError` with the panic's
-/// message,
-/// which a caller's `except Exception` catches, as it does not PyO3's `PanicException`.
+/// message, which a caller's `except Exception` catches, as it does not PyO3's `PanicException`.
 ///
 /// Nothing that `work` had changed is looked at afterwards: a batch whose lock it held is poisoned and says so.
 pub fn guarded<T>(work: impl FnOnce() -> PyResult<T>) -> PyResult<T> {

@@ -33,8 +33,7 @@ impl Pool {
     }
 
     /// Does `work` that may take long in the same way. Where a signal's handler raises meanwhile, as that of Ctrl-C
-    /// does,
-    /// `work` finds its argument set and should end soon; then the handler's exception is raised.
+    /// does, `work` finds its argument set and should end soon; then the handler's exception is raised.
     pub fn run_until_signal<T: Send>(&mut self, py: Python, work: impl FnOnce(&AtomicBool) -> T + Send) -> PyResult<T> {
         let pool = self.here()?;
         let stop = AtomicBool::new(false);

@@ -25,8 +25,8 @@ pub struct Progress {
     pub total: usize,
 }
 
-/// Threads for work on all cores: one a core, or as many as `RAYON_NUM_THREADS` asks for, up to four a core and never
-/// less than 16. More would be no faster, and their stacks alone may not fit into the address space.
+/// Threads for work on all cores: one a core, or as many as `RAYON_NUM_THREADS` asks for, up to four a core or, where
+/// that is more, 16. More would be no faster, and their stacks alone may not fit into the address space.
 pub fn n_threads() -> usize {
     let n_cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
     let asked = std::env::var("RAYON_NUM_THREADS")

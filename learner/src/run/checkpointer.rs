@@ -72,8 +72,7 @@ impl Checkpointer {
     }
 
     /// What there is to go back to, in words. That a checkpoint was read does not make it a good one: its numbers may
-    /// be
-    /// what the run failed by.
+    /// be what the run failed by.
     pub fn last_good(&self) -> String {
         let file = self.file.display();
         match (self.file.is_file(), self.is_continued) {

@@ -16,8 +16,7 @@ fn actions(scenario: &Scenario) -> Vec<Action> {
 }
 
 /// What of `other` is not as in `trained`: a key, or words, with both values where they are short. None where a policy
-/// that
-/// was trained in the one drives and observes the same in the other.
+/// that was trained in the one drives and observes the same in the other.
 pub(super) fn difference(trained: &Scenario, other: &Scenario) -> Option<String> {
     let differing = |what: &str, value: fn(&Scenario) -> String| {
         let [value, expected] = [other, trained].map(value);
