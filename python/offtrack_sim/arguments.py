@@ -7,7 +7,7 @@ import itertools
 import operator
 import os
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from typing import Any, TypeGuard
 
 import numpy as np
@@ -66,10 +66,17 @@ def check_commands(name: str, commands: npt.NDArray[Any]) -> None:
         raise ValueError(f"{name}[{', '.join(map(str, index))}]: {commands[index]}; must lie in -1..1")
 
 
+def check_order(name: str, given: object, needed: str) -> None:
+    """An error for what has no order of its own, such as a set, and for bytes, which are no list of numbers."""
+    if isinstance(given, Set | Mapping | bytes | bytearray | memoryview):
+        raise TypeError(f"{name}: {type(given).__name__}; {needed}")
+
+
 def names_of(routes: Iterable[str]) -> list[str]:
     """Names of routes as a list."""
     if isinstance(routes, str):
         return [text("routes", routes)]
+    check_order("routes", routes, "a sequence is needed: random roads and roads of files stand in its order")
     try:
         names = list(itertools.islice(routes, MOST_NAMES + 1))
     except TypeError:
@@ -84,6 +91,7 @@ def names_of(routes: Iterable[str]) -> list[str]:
 
 def names_of_values(values: Iterable[str]) -> list[str]:
     """Names of values as a list."""
+    check_order("values", values, "a sequence is needed: a network reads them in its order")
     try:
         names = [values] if isinstance(values, str) else list(itertools.islice(values, MOST_VALUES + 1))
     except TypeError:
@@ -104,11 +112,24 @@ def text(name: str, value: object) -> str:
     return value
 
 
-def check_once(name: str, indices: list[int]) -> None:
-    """An error where a truck is named twice."""
+def trucks_of(envs: Iterable[int], num_envs: int) -> list[int]:
+    """Trucks that begin, each once: no more than there are, however long what was given is."""
+    needed = "a sequence of indices of trucks is needed, or None for all"
+    check_order("envs", envs, needed)
+    try:
+        given = list(itertools.islice(envs, num_envs + 1))
+    except TypeError:
+        raise TypeError(f"envs: {envs!r}; {needed}") from None
+    if len(given) > num_envs:
+        raise ValueError(f"envs: more than {num_envs} of them; the batch has as many trucks")
+    indices = [checked_integer(f"envs[{index}]", env) for index, env in enumerate(given)]
+    outside = next((env for env in indices if not 0 <= env < num_envs), None)
+    if outside is not None:
+        raise ValueError(f"envs: {outside}; the batch has trucks 0..{num_envs - 1}")
     if len(set(indices)) < len(indices):
         twice, _ = Counter(indices).most_common(1)[0]
-        raise ValueError(f"{name}: {twice} stands twice; a truck begins one episode at a time")
+        raise ValueError(f"envs: {twice} stands twice; a truck begins one episode at a time")
+    return indices
 
 
 def device_name(device: object) -> str:
@@ -131,11 +152,14 @@ def numbers(name: str, value: npt.ArrayLike, needed: str) -> npt.NDArray[Any]:
     return found
 
 
-def real(value: object) -> float:
+def real(name: str, value: object, bounds: str) -> float:
     """A number as a float; texts and booleans, which ``float`` takes, are none."""
     if not isinstance(value, int | float | np.integer | np.floating) or isinstance(value, bool):
-        raise TypeError
-    return float(value)
+        raise TypeError(f"{name}: {value!r}; a number is needed")
+    try:
+        return float(value)
+    except OverflowError:
+        raise ValueError(f"{name}: too large for a float; must {bounds}") from None
 
 
 def single(found: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
@@ -145,8 +169,9 @@ def single(found: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
 
 
 def is_sequence(given: object) -> TypeGuard[Sequence[Any]]:
-    """Whether things stand in an order, one for each truck: not a text, a set or a dict."""
-    return isinstance(given, Sequence | np.ndarray) and not isinstance(given, str) and getattr(given, "ndim", 1) > 0
+    """Whether things stand in an order, one for each truck: not a text, bytes, a set or a dict."""
+    is_text = isinstance(given, str | bytes | bytearray | memoryview)
+    return isinstance(given, Sequence | np.ndarray) and not is_text and getattr(given, "ndim", 1) > 0
 
 
 def check_length(name: str, given: Sequence[Any] | npt.NDArray[Any] | None, n: int) -> None:
@@ -163,10 +188,12 @@ def stream_of(name: str, given: tuple[int, int] | None) -> tuple[int, int] | Non
     """A stream, if it is a pair of seed and index."""
     if given is None:
         return None
+    needed = "a pair of seed and index is needed"
+    check_order(name, given, needed)
     try:
         seed, env = given
     except (TypeError, ValueError):
-        raise TypeError(f"{name}: {given!r}; a pair of seed and index is needed") from None
+        raise TypeError(f"{name}: {given!r}; {needed}") from None
     return within(f"{name}[0]", seed, 0, 2**32), within(f"{name}[1]", env, 0, 2**32)
 
 

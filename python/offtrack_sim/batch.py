@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import enum
-import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -13,20 +12,19 @@ import numpy.typing as npt
 from . import _offtrack
 from .arguments import (
     check_length,
-    check_once,
     checked_integer,
     checked_seed,
     device_name,
     mode_name,
     names_of,
     numbers,
-    real,
     stream_of,
     text,
+    trucks_of,
     weights_of,
     within,
 )
-from .episodes import Ends, Floats, GivenStart, Ints, Start
+from .episodes import Ends, Floats, GivenStart, Ints, Start, start_of
 from .geometry import Road
 from .layout import COLUMNS
 from .scenarios import Scenario, given, kept, kept_routes
@@ -45,7 +43,8 @@ class Batch(_offtrack.Batch):
         num_envs: Number of trucks.
         split: Routes that episodes are drawn from: ``"train"``, ``"validation"`` or ``"test"``.
         routes: Names of routes (``"16m/N-left-3"``) or of roundabouts (``"16m"``) of any split, in place of a split;
-            and of random roads, as on the command line (``"wide/7/12"``).
+            and of random roads, as on the command line (``"wide/7/12"``), or files of roads, which stand in the order
+            named behind the benchmark's own.
         seed: Seed of routes, starts and random actions, ``0..2**32``. Truck ``i`` draws from the stream ``(seed, i)``.
         autoreset: What follows the end of an episode: ``"same_step"``, ``"next_step"``, ``"disabled"``, or Gymnasium's
             ``AutoresetMode``.
@@ -265,11 +264,7 @@ class Batch(_offtrack.Batch):
         Raises:
             TypeError, ValueError: For what is not as above; the message names it, and no truck has begun.
         """
-        indices = list(range(self.num_envs)) if envs is None else self._indices(envs)
-        outside = next((env for env in indices if not 0 <= env < self.num_envs), None)
-        if outside is not None:
-            raise ValueError(f"envs: {outside}; the batch has trucks 0..{self.num_envs - 1}")
-        check_once("envs", indices)
+        indices = list(range(self.num_envs)) if envs is None else trucks_of(envs, self.num_envs)
         if seeds is not None and streams is not None:
             raise ValueError("seeds, streams: give one of them")
         for name, values in {"seeds": seeds, "streams": streams, "routes": routes, "starts": starts}.items():
@@ -325,27 +320,12 @@ class Batch(_offtrack.Batch):
         """
         return self.dimensions_of(self._vehicle("vehicle", vehicle))
 
-    def _indices(self, envs: Iterable[int]) -> list[int]:
-        """Trucks that a caller names: no more than there are, however long what was given is."""
-        try:
-            given = list(itertools.islice(envs, self.num_envs + 1))
-        except TypeError:
-            raise TypeError(f"envs: {envs!r}; indices of trucks are needed, or None for all") from None
-        if len(given) > self.num_envs:
-            raise ValueError(f"envs: more than {self.num_envs} of them; the batch has as many trucks")
-        return [checked_integer(f"envs[{index}]", env) for index, env in enumerate(given)]
-
     def _start(self, index: int, given: Start | tuple[float, ...] | None) -> GivenStart | None:
         """A start with the index of its vehicle."""
         if given is None:
             return None
-        try:
-            start = Start(*given)
-            offset, heading, speed, along = (real(fraction) for fraction in (*start[:3], start.along))
-        except (TypeError, ValueError):
-            needed = "a tuple of offset, heading error, speed, vehicle and along is needed, see offtrack_sim.Start"
-            raise TypeError(f"starts[{index}]: {given!r}; {needed}") from None
-        return offset, heading, speed, self._vehicle(f"starts[{index}].vehicle", start.vehicle), along
+        start = start_of(f"starts[{index}]", given)
+        return (*start[:3], self._vehicle(f"starts[{index}].vehicle", start.vehicle), start.along)
 
     def _vehicle(self, name: str, given: int | tuple[str, str] | list[str]) -> int:
         """Index of a vehicle, which may be given as a class."""

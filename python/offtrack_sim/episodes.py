@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Iterable
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+
+from .arguments import check_order, real
 
 Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int64]
@@ -44,3 +47,19 @@ class Start(NamedTuple):
     at most; ``k / (n - 1)`` is waypoint ``k`` of ``n``, see :meth:`Batch.road`. Both units stand there as if the truck
     had followed the lane, with the wheels and the lean that a bend asks for, and the clock begins: the time limit is
     that of the whole route. The start is not judged: a truck that touches a kerb there ends with its first step."""
+
+
+def start_of(name: str, given: Iterable[Any]) -> Start:
+    """A start, or a tuple of its first values, with floats for its numbers."""
+    needed = "a tuple of offset, heading error, speed, vehicle and along is needed, see offtrack_sim.Start"
+    try:
+        check_order(name, given, needed)
+        start = Start(*given)
+        return start._replace(
+            offset=real(f"{name}.offset", start.offset, "lie in -1..1"),
+            heading=real(f"{name}.heading", start.heading, "lie in -1..1"),
+            speed=real(f"{name}.speed", start.speed, "lie in -1..1"),
+            along=real(f"{name}.along", start.along, "lie in 0..1"),
+        )
+    except TypeError:
+        raise TypeError(f"{name}: {given!r}; {needed}") from None

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence, Set
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _offtrack
-from .arguments import checked_integer, is_sequence, names_of, numbers, single, text, within
+from .arguments import check_order, checked_integer, is_sequence, names_of, numbers, single, text, within
 from .scenarios import Scenario, given, kept, kept_routes
 from .state import check_world
 
@@ -92,8 +92,7 @@ class Observer(_offtrack.Observer):
         *,
         num_threads: int | None = None,
     ) -> Observer:
-        if isinstance(routes, Set | Mapping):
-            raise TypeError(f"routes: {routes!r}; a sequence is needed, one a truck or one for all")
+        check_order("routes", routes, "a sequence is needed, one a truck or one for all")
         names = names_of(routes)
         if not names:
             raise ValueError("routes: empty; the name of each truck's route is needed, or of one for all")

@@ -15,7 +15,7 @@ try:
 except ImportError:
     raise ImportError("sb3: stable-baselines3 is needed; pip install offtrack-sim[sb3]") from None
 
-from .arguments import checked_seed, within
+from .arguments import check_order, checked_seed, within
 from .batch import Batch, Bools
 from .episodes import Floats
 from .layout import Ended
@@ -188,5 +188,6 @@ class RoundaboutVecEnv(VecEnv):
         """The trucks meant."""
         if indices is None:
             return list(range(self.num_envs))
+        check_order("indices", indices, "a sequence of indices of trucks is needed, or None for all")
         chosen = [indices] if isinstance(indices, (int, np.integer)) else list(indices)
         return [within("indices", int(env), 0, self.num_envs) for env in chosen]

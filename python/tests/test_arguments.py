@@ -193,6 +193,8 @@ def test_a_value_of_a_wrong_type_is_refused_by_the_arguments_name(call: Callable
     ("call", "message"),
     [
         (lambda: batch_of_two().begin([0, 0], seeds=[1, 2]), "envs: 0 stands twice"),
+        (lambda: batch_of_two().begin([1], starts=[sim.Start(10**400)]), r"starts\[1\].offset: too large for a float"),
+        (lambda: batch_of_two().begin(starts=[None, (0, -(10**5000))]), r"starts\[1\].heading: too large .* -1..1$"),
         (lambda: sim.Batch(device=""), 'device: \'\'; "cpu", "gpu" or'),
         (lambda: sim.Batch("\ud800"), "scenario: .* is no UTF-8"),
         (lambda: sim.Batch(routes=["\ud800"]), "routes: .* is no UTF-8"),

@@ -81,6 +81,8 @@ def test_attributes_are_those_of_the_batch() -> None:
     env.set_attr("render_size", 80)
     assert env.get_images()[0].shape == (80, 80, 3)
     assert len(env.env_method("render", indices=1)) == 1
+    with pytest.raises(TypeError, match="^indices: set; a sequence of indices of trucks is needed, or None for all"):
+        env.get_attr("render_size", indices={0, 2})
     with pytest.raises(ValueError, match="without indices"):
         env.set_attr("render_size", 96, indices=[0])
     with pytest.raises(AttributeError, match="no_such_method"):
