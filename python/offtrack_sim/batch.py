@@ -340,10 +340,15 @@ class Batch(_offtrack.Batch):
 
     def columns(self, *names: str) -> dict[str, Array]:
         """Copies of columns, all where none is named: arrays of ``num_envs`` rows, see :data:`COLUMNS`, of those of
-        vehicles without rows where there are none.
+        vehicles without rows where there are none. From a graphics device only the named ones are read.
 
-        ``batch.columns("truck")["truck"]["speed"]`` is every truck's speed [m/s]; ``clearance`` is that of the last
-        step, of the episode before where one has begun. From a graphics device only the named ones are read.
+        ``batch.columns("truck")["truck"]["speed"]`` is every truck's speed [m/s].
+
+        Where an episode ended and another began in the same step (``"same_step"``), these are of that step:
+        ``action``, ``command``, ``clearance``, ``ended``, ``terms``, ``reward``, ``next_observation``, ``next_extras``
+        and ``next_around``. The others are the next episode's: ``truck``, ``control``, ``progress``, ``ranges``,
+        ``poses``, ``observation``, ``extras``, ``cars`` and ``around``. In the other modes all are of the episode that
+        has ended until the next one begins. ``clearance`` stays until the first step of an episode.
         """
         wanted = [text("column", name) for name in names] or list(COLUMNS)
         rows = self.column_bytes(wanted)

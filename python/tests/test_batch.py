@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import threading
 import time
 from pathlib import Path
@@ -114,6 +115,39 @@ def test_what_ended_is_told_once_with_the_last_observation(autoreset: str) -> No
         # Nothing has happened since: it is told again, and a step later no more.
         assert batch.ended() is not None
     assert 100 < told and 10 < of_one_step
+
+
+@pytest.mark.parametrize("scenario", ["transfer2026", "traffic2026", "laden2026-continuous"])
+def test_columns_after_an_end_are_of_the_step_or_of_the_next_episode_as_it_is_said(scenario: str) -> None:
+    said = re.sub(r"\s+", " ", str(Batch.columns.__doc__))
+    parts = re.search(r"are of that step: (.*?)\. The others are the next episode's: (.*?)\. In", said)
+    assert parts
+    of_step, of_next = (set(re.findall("``(.*?)``", part)) for part in parts.groups())
+    assert of_step | of_next == set(COLUMNS) and not of_step & of_next
+    same, kept = (Batch(scenario, 32, seed=3, autoreset=mode) for mode in ("same_step", "disabled"))
+    rng, ends, differ = np.random.default_rng(0), 0, set()
+    while ends < 8:
+        actions: Any = rng.integers(0, len(same.action_table), 32)
+        if same.n_commands:
+            actions = rng.uniform(-1, 1, (32, same.n_commands)).astype(np.float32)
+        done = same.step(actions)[2]
+        kept.step(actions)
+        if not done.any():
+            continue
+        ends += 1
+        found, last = same.columns(), kept.columns()
+        kept.begin(np.flatnonzero(done))
+        begun = kept.columns()
+        for name in (name for name in COLUMNS if len(found[name])):
+            expected = last if name in of_step else begun
+            assert found[name][done].tobytes() == expected[name][done].tobytes(), name
+            if last[name][done].tobytes() != begun[name][done].tobytes():
+                differ.add(name)
+    # What begins an episode leaves these as they were, so that they may be either.
+    assert set(COLUMNS) - differ <= {"action", "command", "clearance", "poses", "cars", "extras", "next_extras"} | {
+        "around",
+        "next_around",
+    }
 
 
 def test_a_state_is_restored_bit_for_bit_with_its_streams() -> None:

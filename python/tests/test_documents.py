@@ -8,7 +8,10 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+
+import offtrack_sim
 
 DOCUMENTS = Path(__file__).parents[1]
 # Run by tests/consumers, where the library is installed.
@@ -43,6 +46,33 @@ def test_the_snippets_run(
         assert list(tmp_path.glob("films/*.mp4"))
     else:
         assert "attard2023 test: 100.0% (46/46); arrived 46" in printed
+
+
+def test_the_tutorials_reward_is_that_of_the_step_that_was_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    roundabout, benchmark, _, own_reward, _ = snippets("TUTORIAL.ipynb")
+    names: dict[str, Any] = {"__name__": "snippet"}
+    for block in (roundabout, benchmark, own_reward):
+        exec(compile(block, "TUTORIAL.ipynb", "exec"), names)
+    envs = names["envs"]
+    # The same trucks, of which none is replaced.
+    batch = offtrack_sim.Batch("own.toml", 8, autoreset="disabled")
+    leaned = 0.0
+    for seed in range(4):
+        envs.reset(seed=seed)
+        batch.begin(streams=[(seed, env) for env in range(8)])
+        while not batch.waiting().any():
+            rewards = envs.step(np.full(8, 5))[1]
+            batch.step(np.full(8, 5))
+            columns = batch.columns("terms", "truck")
+            terms, leaning = columns["terms"], abs(columns["truck"]["trailer_load_transfer_ratio"])
+            expected = terms["waypoints"] - 0.1 * terms["lane_distance"] - 0.1 * leaning - 10.0 * terms["failure"]
+            np.testing.assert_allclose(rewards, expected, atol=1e-6)
+        leaned += float(leaning[batch.waiting()].sum())
+        assert (envs.step(np.full(8, 5))[1][batch.waiting()] == 0).all()
+    assert leaned > 0.1
 
 
 def test_the_notebook_is_one_that_jupyter_opens_without_what_a_run_left() -> None:
