@@ -360,7 +360,10 @@ class Batch(_offtrack.Batch):
         return {**self.columns(), "stream": stream, "world": np.array(self.fingerprint(), dtype=np.uint32)}
 
     def restore(self, state: Mapping[str, Array]) -> None:
-        """Goes on from a state: with the same scenario and routes every later step is the same, bit for bit.
+        """Goes on from a state: every later step is the same, bit for bit.
+
+        The benchmark and its files, routes or split, and ``max_episode_steps`` must be those of the batch that it is
+        from, and ``num_envs``.
 
         Raises:
             TypeError: For anything but a mapping of names to arrays.

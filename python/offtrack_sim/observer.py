@@ -130,7 +130,7 @@ class Observer(_offtrack.Observer):
 
     def __setstate__(self, kept: tuple[int, list[tuple[int, int | None, int, float]]]) -> None:
         world, states = kept
-        check_world(self.scenario, world, self.fingerprint())
+        check_world(self.scenario, world, self.fingerprint(), "benchmark file and routes")
         self.restore_states(states)
 
     def begin(

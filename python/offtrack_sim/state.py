@@ -11,10 +11,12 @@ import numpy.typing as npt
 from .layout import COLUMNS
 
 
-def check_world(scenario: str, found: npt.ArrayLike, fingerprint: int) -> None:
-    """An error where a state is of another world than this one of a benchmark."""
+def check_world(scenario: str, found: npt.ArrayLike, fingerprint: int, alike: str) -> None:
+    """An error where a state is of another world than this one of a benchmark; ``alike`` is what makes a world."""
     if np.asarray(found).reshape(-1).tolist() != [fingerprint]:
-        raise ValueError(f"scenario: {scenario} has changed since this state was kept, or is another one here")
+        raise ValueError(
+            f"scenario: {scenario} has changed since this state was kept, or is another one here; {alike} must be alike"
+        )
 
 
 def checked_state(
@@ -28,7 +30,7 @@ def checked_state(
     missing = [name for name in names if name not in state]
     if missing:
         raise ValueError(f"state: {missing[0]} is missing; Batch.state() gives all of {', '.join(names)}")
-    check_world(scenario, state["world"], fingerprint)
+    check_world(scenario, state["world"], fingerprint, "benchmark file, routes or split, and max_episode_steps")
     columns = []
     for name, dtype in COLUMNS.items():
         column = np.asarray(state[name])

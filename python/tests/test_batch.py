@@ -177,6 +177,9 @@ def test_a_state_is_restored_bit_for_bit_with_its_streams() -> None:
         with pytest.raises(ValueError, match=message):
             other.restore(wrong)
         assert all(before[name].tobytes() == column.tobytes() for name, column in other.state().items())
+    shorter = Batch(num_envs=12, max_episode_steps=9)
+    with pytest.raises(ValueError, match="; benchmark file, routes or split, and max_episode_steps must be alike"):
+        shorter.restore(state)
     # NumPy makes an array of one number of what is a number.
     other.restore({name: np.ascontiguousarray(column) for name, column in state.items()})
 
