@@ -7,17 +7,22 @@ that comes with the package and back, R begins again, N takes the next route, P 
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _offtrack
+from .arguments import names_of
 from .batch import Batch
 from .layout import Ended
+from .observer import Observer
 from .policy import Policy
+from .scenarios import Scenario
 
 #: Side of the window [pixels].
 SIDE = 720
@@ -37,14 +42,16 @@ class Game:
 
     def __init__(
         self,
-        scenario: str = "attard2023",
+        scenario: Scenario = "attard2023",
         *,
         split: str = "test",
         routes: Iterable[str] | None = None,
         seed: int = 0,
         policy: Policy | None = None,
     ) -> None:
-        self.batch = Batch(scenario, 1, split=split, routes=routes, seed=seed, autoreset="disabled")
+        names = None if routes is None else names_of(routes)
+        self.batch = Batch(scenario, 1, split=split, routes=names, seed=seed, autoreset="disabled")
+        self.mirrored = _mirrored(self.batch, scenario, names or [])
         self.policy = _shipped(self.batch) if policy is None else policy
         if self.policy is not None:
             self.policy.check(self.batch)
@@ -61,6 +68,8 @@ class Game:
         names = self.batch.split_routes
         self.route = (self.route + route_after) % len(names)
         self.batch.begin([0], routes=[names[self.route]])
+        # Where traffic keeps to the left, the truck drives in the mirror image of what the window shows.
+        self.side = -1 if names[self.route].rpartition("/")[0] in self.mirrored else 1
         self.level = int(np.abs(self.levels).argmin())
         self.speed = len(self.speeds) - 1
         self.driver = None if self.policy is None else self.policy.driver(1)
@@ -71,12 +80,12 @@ class Game:
         self.is_player = self.driver is None or not self.is_player
 
     def turn(self, levels: int) -> None:
-        """Steers by so many levels more, left positive."""
-        self.level = int(np.clip(self.level + levels, 0, len(self.levels) - 1))
+        """Steers by so many levels more, left on the road positive."""
+        self.level = int(np.clip(self.level + self.side * levels, 0, len(self.levels) - 1))
 
     def straighten(self) -> None:
         """Steers one level nearer to straight ahead."""
-        self.turn(int(np.sign(int(np.abs(self.levels).argmin()) - self.level)))
+        self.level += int(np.sign(int(np.abs(self.levels).argmin()) - self.level))
 
     def accelerate(self, levels: int) -> None:
         """Chooses a higher or lower target speed, or change of it."""
@@ -104,15 +113,33 @@ class Game:
         columns = self.batch.columns("truck", "clearance", "terms")
         truck, clearance = columns["truck"][0], columns["clearance"][0]
         nearest = min(float(value) for value in clearance.tolist())
+        angle = self.side * round(float(np.degrees(truck["steering"])))
         driver = "you drive" if self.is_player else "the policy drives"
         lines = [
             f"{self.batch.split_routes[self.route]}: {driver}",
-            f"{3.6 * truck['speed']:.0f} km/h, steer angle {np.degrees(truck['steering']):+.0f} deg, "
-            f"{max(nearest, 0.0):.2f} m to the kerb",
+            f"{3.6 * truck['speed']:.0f} km/h, steer angle {angle:+d} deg, {max(nearest, 0.0):.2f} m to the kerb",
         ]
         if self.ended is not Ended.RUNNING:
             lines.append(f"{self.ended.name.lower().replace('_', ' ')}: R again, N next route")
         return lines
+
+
+def _mirrored(batch: Batch, scenario: Scenario, routes: list[str]) -> set[str]:
+    """Names of the batch's roads with left-hand traffic."""
+    # The batch names the road of a file by the stem; another one's observer knows it by its path.
+    paths = [path for name in routes for path in (name, name.rpartition("/")[0]) if path.endswith(".toml")]
+    files = {Path(path).stem.removesuffix(".outline"): path for path in paths}
+    one_each = {route.rpartition("/")[0]: route for route in batch.split_routes}
+    # Random roads have right-hand traffic; those of a benchmark take long to draw.
+    names = {
+        road: files.get(road, road) + route.removeprefix(road)
+        for road, route in one_each.items()
+        if not re.fullmatch(r".+/\d+/\d+", road)
+    }
+    if not names:
+        return set()
+    observer = Observer(scenario, list(names.values()))
+    return {road for road, name in names.items() if observer.frame(name).mirrored}
 
 
 def _shipped(batch: Batch) -> Policy | None:

@@ -1,13 +1,16 @@
 """The game: a truck driven by keys."""
 
 import os
+import re
 import subprocess
 import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+import offtrack_sim
 from offtrack_sim import play
 from offtrack_sim.play import Game
 
@@ -100,3 +103,50 @@ def test_without_pygame_or_with_a_wrong_route_the_game_says_what_is_needed() -> 
         text=True,
     )
     assert "play: pygame is needed; pip install offtrack_sim[play]" in without.stderr
+
+
+def left_hand(text: str) -> str:
+    """A roundabout file's text with left-hand traffic: other signs, and lanes' names exchanged."""
+    text = re.sub(r"(bearing_deg|offset) = (-?)", lambda key: f"{key[1]} = {'' if key[2] else '-'}", text)
+    lanes = {"left": "right", "right": "left"}
+    return 'hand = "left"\n' + re.sub(r"\.(left|right)\]", lambda lane: f".{lanes[lane[1]]}]", text)
+
+
+@pytest.mark.parametrize(
+    ("scenario", "angle"), [("attard2023", "+6"), ("laden2026-continuous", "+4"), ("traffic2026", "+6")]
+)
+def test_on_a_left_hand_road_the_left_key_turns_left_on_the_road_and_the_angle_is_shown_so(
+    scenario: str, angle: str, tmp_path: Path
+) -> None:
+    offtrack_sim.write_scenarios(tmp_path / "all")
+    file = tmp_path / "left.toml"
+    file.write_text(left_hand((tmp_path / "all/roundabouts/20m.toml").read_text()))
+    observer = offtrack_sim.Observer(scenario, [f"{file}/N-right-4"])
+    for routes, side in (([f"{file}/N-right-4"], -1), ([str(file)], -1), (["20m/N-left-4"], 1)):
+        game = Game(scenario, routes=routes)
+        for _ in range(3):
+            game.turn(1)
+            game.step()
+        truck = game.batch.columns("truck")["truck"][0]
+        # The batch has the mirror image of a left-hand road.
+        assert np.sign(truck["steering"]) == side and f"steer angle {angle} deg" in game.says()[1], game.says()
+        if game.batch.n_commands == 0:
+            on_the_road = (observer if side < 0 else offtrack_sim.Observer(scenario, routes)).command(game.actions())[0]
+            assert on_the_road[0] > 0
+        for _ in range(3):
+            game.straighten()
+        assert game.levels[game.level] == 0
+
+
+def test_a_left_hand_road_is_known_beside_others_and_among_the_benchmarks_own(tmp_path: Path) -> None:
+    offtrack_sim.write_scenarios(tmp_path / "all")
+    file = tmp_path / "left.toml"
+    file.write_text(left_hand((tmp_path / "all/roundabouts/20m.toml").read_text()))
+    game = Game("attard2023", routes=["wide/7/12", str(file), "16m/N-left-3"])
+    sides = {}
+    for _ in game.batch.split_routes:
+        game.begin(1)
+        sides[game.says()[0].rpartition("/")[0]] = game.side
+    assert sides == {"wide/7/12": 1, "left": -1, "16m": 1}
+    own = offtrack_sim.benchmark("attard2023").changed({"roundabout[3].file": str(file), "roundabout[3].test": "all"})
+    assert Game(own, routes=["left"]).side == -1
