@@ -54,6 +54,9 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], Any]):
         device: ``"cpu"``, ``"gpu"`` or part of an adapter's name.
         numeric_infos: Whether infos have indices in place of names, ``route`` in ``batch.route_names`` and ``vehicle``
             in ``batch.vehicle_classes``, as ``gymnasium.wrappers.NumpyToTorch`` needs them.
+        max_episode_steps: Steps after which an episode is truncated in any case; None for the benchmark's limit alone.
+            ``gymnasium.make`` keeps an argument of this name to itself and wraps the environment in its ``TimeLimit``,
+            whose ends have no infos: make a ``Roundabout`` where they are needed, or :func:`offtrack_sim.make_vec`.
         weights: How often routes are drawn, as for :class:`offtrack_sim.Batch`; ``batch.weigh`` changes it.
 
     Copies (``copy.copy``, ``copy.deepcopy``) and pickles go on from the environment's state, independent of it.
@@ -76,6 +79,7 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], Any]):
         render_size: int = 480,
         device: str = "cpu",
         numeric_infos: bool = False,
+        max_episode_steps: int | None = None,
         weights: Mapping[str, float] | None = None,
     ) -> None:
         check_render_mode(render_mode, render_size)
@@ -87,6 +91,7 @@ class Roundabout(gymnasium.Env[npt.NDArray[np.float32], Any]):
             autoreset="disabled",
             num_threads=1,
             device=device,
+            max_episode_steps=max_episode_steps,
             weights=weights,
         )
         self.observation_space = observation_space(len(self.batch.extras), vehicles=self.batch.observes_vehicles)  # type: ignore[assignment]

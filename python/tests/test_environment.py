@@ -63,6 +63,19 @@ def test_an_episode_ends_with_its_reason_and_needs_a_reset() -> None:
     env.step(np.int64(0))
 
 
+def test_a_shorter_time_limit_of_its_own_is_gymnasiums_with_infos() -> None:
+    own = offtrack_sim.Roundabout(max_episode_steps=5)
+    wrapped = gymnasium.make(ID, max_episode_steps=5)
+    own.reset(seed=1)
+    route = wrapped.reset(seed=1)[1]["route"]
+    for step in range(5):
+        mine, its = own.step(np.int64(4)), wrapped.step(np.int64(4))
+        assert (mine[0] == its[0]).all() and mine[1:4] == its[1:4] and mine[3] == (step == 4)
+    assert mine[4] == {"ended": offtrack_sim.Ended.TIMED_OUT, "is_success": False, "route": route}
+    # As the documentation says of Gymnasium's wrapper.
+    assert its[4] == {}
+
+
 @pytest.mark.parametrize(
     ("action", "error", "message"),
     [
