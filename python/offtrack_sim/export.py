@@ -30,7 +30,7 @@ def save(
     scenario: Scenario = "attard2023",
     mean: npt.ArrayLike | None = None,
     variance: npt.ArrayLike | None = None,
-    epsilon: float = 1e-8,
+    epsilon: float | None = None,
     values: Iterable[str] | None = None,
     frames: int | None = None,
     padding: str | None = None,
@@ -62,7 +62,7 @@ def save(
             frames were normalised.
         variance: Their variance, ``[n_values]``: a value becomes ``(value - mean) / sqrt(variance + epsilon)``, clamped
             to -10..10.
-        epsilon: Added to the variance.
+        epsilon: Added to the variance, at least 0; None for 1e-8.
         values: Names of the values that it reads, in its order, for a network that was trained on some of them: groups
             of :data:`offtrack_sim.OBSERVATION` (``"tractor_range"``), single values (``"bearing[2]"``), extras.
         frames: Number of steps' values that it sees side by side, oldest first. A model of Stable-Baselines3 with
@@ -75,8 +75,8 @@ def save(
     Raises:
         TypeError: For a model or layer that a policy file cannot hold; the message names it.
         ValueError: For sizes that do not fit each other or the benchmark, numbers so large that outputs may not be
-            finite, a mean without a variance, a ``VecNormalize`` that clips
-            elsewhere than at 10, what a model brings itself, and numbers that are not finite.
+            finite, a mean without a variance, an epsilon without both, a ``VecNormalize`` that clips elsewhere than at
+            10, what a model brings itself, and numbers that are not finite.
         OSError: Where the file cannot be written.
     """
     found = trained.network_of(
@@ -97,10 +97,14 @@ def save(
         found = replace(found, values=names_of_values(values))
     if (mean is None) != (variance is None):
         raise ValueError("mean, variance: only one of them is given; both are needed")
+    if epsilon is not None and mean is None:
+        raise ValueError(f"epsilon: {epsilon!r}; is added to a variance: give mean and variance, or leave it out")
     if mean is not None and variance is not None:
         if found.normalisation is not None:
             raise ValueError("mean, variance: the model has those of its VecNormalize; leave them out")
-        found = replace(found, normalisation=trained.normalisation(mean, variance, epsilon))
+        found = replace(
+            found, normalisation=trained.normalisation(mean, variance, 1e-8 if epsilon is None else epsilon)
+        )
     _offtrack.write_policy(file_name(file), given(scenario), found)
 
 

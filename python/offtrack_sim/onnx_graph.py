@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from .arguments import single
 from .episodes import Floats
 from .network import Layer, Network
 from .trained import CLIP
@@ -154,7 +155,7 @@ class _Reader:
         for value, other in (node.input[:2], node.input[1::-1]):
             constant = self.constant(other)
             if constant is not None:
-                return value, np.asarray(constant, np.float32)
+                return value, single(np.asarray(constant))
         raise TypeError(f"{_named(node)}: both inputs are computed; a constant is needed beside what flows")
 
 
@@ -210,7 +211,7 @@ def _passed(reader: _Reader, node: Any) -> tuple[str, tuple[str, Any] | None]:
     if kind in ("Sub", "Div", "MatMul"):
         constant = reader.constant(node.input[1])
         if constant is not None:
-            return node.input[0], (kind, np.asarray(constant, np.float32))
+            return node.input[0], (kind, single(np.asarray(constant)))
     if kind == "Clip":
         bounds = [reader.constant(name) for name in node.input[1:3]]
         if len(bounds) < 2:
@@ -259,7 +260,7 @@ def _gemm(reader: _Reader, node: Any) -> Layer:
         raise TypeError(f"{_named(node)}: constant weights, alpha = beta = 1 and no transA are needed")
     weights = weights.T if reader.attribute(node, "transB", 0) else weights
     biases = np.zeros(weights.shape[1]) if biases is None else biases
-    return np.ascontiguousarray(weights, np.float32), np.asarray(biases, np.float32).reshape(-1)
+    return np.ascontiguousarray(single(weights)), single(biases).reshape(-1)
 
 
 def _recurrent(reader: _Reader, node: Any) -> tuple[Layer, Layer]:
@@ -282,7 +283,7 @@ def _recurrent(reader: _Reader, node: Any) -> tuple[Layer, Layer]:
     def ordered(part: Any) -> Floats:
         """Rows gate by gate, in PyTorch's order."""
         rows = np.concatenate([part[gate * n_units : (gate + 1) * n_units] for gate in order])
-        return np.ascontiguousarray(rows.T, np.float32)
+        return np.ascontiguousarray(single(rows.T))
 
     n_rows = len(order) * n_units
     biases = parts[2][0] if len(parts) > 2 else np.zeros(2 * n_rows)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .arguments import numbers
+from .arguments import numbers, real, single
 from .episodes import Floats
 from .network import Layer, Network
 
@@ -56,10 +56,15 @@ def network_of(model: Any, squash: str | None, *, says: bool = False) -> Network
 
 def normalisation(mean: npt.ArrayLike, variance: npt.ArrayLike, epsilon: float) -> tuple[Floats, Floats]:
     """Mean and factor of each value."""
-    spread = _numbers("variance", variance) + _numbers("epsilon", epsilon)
-    if not (spread > 0).all():
+    added = real("epsilon", epsilon, "be finite and at least 0")
+    if not 0 <= added < np.inf:
+        raise ValueError(f"epsilon: {added}; must be finite and at least 0")
+    spread = _numbers("variance", variance)
+    if not np.isfinite(spread).all():
+        raise ValueError(f"variance: {spread[~np.isfinite(spread)][0]}; every value must be finite")
+    if not (spread + added > 0).all():
         raise ValueError("variance: every value plus epsilon must be greater than 0")
-    return _vector("mean", mean), _vector("variance", 1 / np.sqrt(spread))
+    return _vector("mean", mean), _vector("variance", 1 / np.sqrt(spread + added))
 
 
 def _of_sb3(policy: Any, model: Any) -> Network:
@@ -247,11 +252,11 @@ def _array(tensor: Any) -> Floats:
     if hasattr(tensor, "detach"):
         tensor = tensor.detach().cpu()
         tensor = (tensor.float() if tensor.is_floating_point() else tensor).numpy()
-    return np.asarray(numbers("layers", tensor, "numbers are needed"), np.float32)
+    return single(numbers("layers", tensor, "numbers are needed"))
 
 
 def _vector(name: str, values: npt.ArrayLike) -> Floats:
-    vector = np.ascontiguousarray(_numbers(name, values), np.float32)
+    vector = np.ascontiguousarray(single(_numbers(name, values)))
     if vector.ndim != 1:
         raise ValueError(f"{name}: shape {vector.shape}; one dimension is needed, a number for each value")
     return vector

@@ -344,6 +344,9 @@ def test_numbers_beyond_float32_are_refused_without_a_warning() -> None:
         lambda: Policy.shipped().act(np.full((1, 69), 1e39)),
         lambda: observer.observe(position, heading, heading, 8.0, acceleration=1e39),
         lambda: offtrack_sim.speed_control(observer, 8.0, 1e39),
+        lambda: export.save("never", [(np.full((69, 9), 1e39), np.zeros(9))]),
+        lambda: export.save("never", layers(((69, 9), 9)), mean=np.full(69, -1e39), variance=np.ones(69)),
+        lambda: export.save("never", layers(((69, 9), 9)), mean=np.ones(69), variance=np.full(69, 1e-90), epsilon=0),
     ):
         with pytest.raises(ValueError, match="inf"):
             call()

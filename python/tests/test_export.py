@@ -195,6 +195,38 @@ def test_what_a_network_reads_and_gives_is_refused_by_its_argument(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"variance": np.where(np.arange(69) == 3, np.inf, 1.0)}, "variance: inf; every value must be finite"),
+        ({"variance": np.full(69, np.nan)}, "variance: nan; every value must be finite"),
+        ({"variance": np.zeros(69), "epsilon": 0.0}, "variance: every value plus epsilon must be greater than 0"),
+        ({"variance": np.ones(69), "epsilon": -0.5}, "epsilon: -0.5; must be finite and at least 0"),
+        ({"variance": np.ones(69), "epsilon": np.nan}, "epsilon: nan; must be finite and at least 0"),
+        ({"variance": np.ones(69), "epsilon": np.inf}, "epsilon: inf; must be finite and at least 0"),
+        ({"variance": np.ones(69), "epsilon": 10**400}, "epsilon: too large for a float; must be finite"),
+        ({"mean": None, "epsilon": 1e-8}, "epsilon: 1e-08; is added to a variance: give mean and variance, or leave"),
+        ({"mean": None, "epsilon": "a"}, "epsilon: 'a'; is added to a variance"),
+    ],
+)
+def test_a_variance_or_an_epsilon_that_cannot_be_is_refused(
+    given: dict[str, Any], message: str, tmp_path: Path
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        export.save(tmp_path / "policy.safetensors", [A, ReLU(), B, ReLU(), C], **{"mean": np.zeros(69), **given})
+    assert not list(tmp_path.iterdir())
+
+
+def test_without_an_epsilon_it_is_1e_8(tmp_path: Path) -> None:
+    def factor(**given: Any) -> float:
+        found = written(tmp_path, [Linear(69, 9, 1)], mean=np.zeros(69), variance=np.full(69, 1e-8), **given)
+        assert found.normalisation is not None
+        return float(found.normalisation[1][0])
+
+    assert factor() == factor(epsilon=1e-8) == pytest.approx(2**-0.5 * 1e4)
+    assert factor(epsilon=np.float32(0)) == pytest.approx(1e4)
+
+
 @pytest.mark.parametrize("weights", [np.full((69, 9), 1 + 2j), np.full((69, 9), "0.5"), np.full((69, 9), True)])
 def test_weights_that_are_no_real_numbers_are_refused(weights: Any, tmp_path: Path) -> None:
     with pytest.raises(TypeError, match=r"layers\[0\]: .*; a pair of arrays, weights and biases, is needed"):

@@ -201,3 +201,13 @@ def test_a_graph_that_normalises_without_clipping_and_what_is_no_graph_are_refus
         export.from_onnx(file)
     with pytest.raises(OSError, match="missing.onnx"):
         export.from_onnx(tmp_path / "missing.onnx")
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_graph_with_numbers_beyond_float32_is_refused_without_a_warning(tmp_path: Path) -> None:
+    for kind in ("MatMul", "Gemm"):
+        model = graph(onnx.helper.make_node(kind, ["x", "w"], ["y"]), constants={})
+        model.graph.initializer.append(onnx.numpy_helper.from_array(np.full((69, 9), 1e39), "w"))
+        onnx.save(model, str(tmp_path / "huge.onnx"))
+        with pytest.raises(ValueError, match="inf"):
+            export.save(tmp_path / "policy.safetensors", export.from_onnx(tmp_path / "huge.onnx"))
