@@ -142,10 +142,10 @@ class Policy:
 
         Raises:
             TypeError: For what is no array of numbers.
-            ValueError: For another number of values than 69 and one for each of ``extras``, for one that is not finite,
-                and for a policy with a memory; the message names them.
+            ValueError: For another shape, another number of values than 69 and one for each of ``extras``, for one that
+                is not finite, and for a policy with a memory; the message names them.
         """
-        rows = _rows(observations)
+        rows = _rows(observations, 1, 2)
         if rows.ndim == 1:
             return self._network.act(rows[None])[0]  # type: ignore[no-any-return]
         return self._network.act(rows)
@@ -157,9 +157,9 @@ class Policy:
         or clipped.
 
         Raises:
-            ValueError: As for :meth:`act`.
+            ValueError: As for :meth:`act`; one observation is ``observation[None]``.
         """
-        return self._network.logits(_rows(observations))
+        return self._network.logits(_rows(observations, 2))
 
     def driver(self, n: int) -> Driver:
         """The policy with a memory for each of ``n`` trucks."""
@@ -196,9 +196,9 @@ class Driver:
 
         Raises:
             TypeError: For what is no array of numbers, and for ``begins`` that are no array of bool, one a truck.
-            ValueError: For another number of rows or values, and for a value that is not finite.
+            ValueError: For another shape or number of rows or values, and for a value that is not finite.
         """
-        return self._native.act(_rows(observations), begins)
+        return self._native.act(_rows(observations, 2), begins)
 
     def __copy__(self) -> Driver:
         # A copy that shared the memory would make this one remember what the copy observes.
@@ -214,7 +214,10 @@ class Driver:
         return f"Driver({self.policy.name!r}, {self.n})"
 
 
-def _rows(observations: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
-    """Observations as the network takes them."""
+def _rows(observations: npt.NDArray[Any], *dimensions: int) -> npt.NDArray[np.float32]:
+    """Observations as the network takes them, of so many dimensions."""
     found = numbers("observations", observations, "an array of numbers, [n, n_values], is needed")
+    if found.ndim not in dimensions:
+        needed = "(n, n_values) is needed" if 1 not in dimensions else "(n, n_values) or (n_values,) is needed"
+        raise ValueError(f"observations: shape {found.shape}; {needed}")
     return np.ascontiguousarray(single(found))

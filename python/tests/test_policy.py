@@ -139,6 +139,20 @@ def test_logits_agree_with_actions_whatever_the_number_of_rows() -> None:
     assert (policy.logits(observations[7:8]) == logits[7:8]).all()
 
 
+def test_observations_of_another_shape_are_refused_by_it() -> None:
+    policy = Policy.shipped()
+    one, many = np.zeros(69, np.float32), np.zeros((2, 3, 69), np.float32)
+    either = r"\(n, n_values\) or \(n_values,\) is needed"
+    for call, message in (
+        (lambda: policy.logits(one), r"shape \(69,\); \(n, n_values\) is needed"),
+        (lambda: policy.act(many), rf"shape \(2, 3, 69\); {either}"),
+        (lambda: policy.act(np.float32(3)), rf"shape \(\); {either}"),  # type: ignore[arg-type]
+        (lambda: policy.driver(2).act(one), r"shape \(69,\); \(n, n_values\) is needed"),
+    ):
+        with pytest.raises(ValueError, match=f"^observations: {message}$"):
+            call()
+
+
 def test_files_that_are_no_policies_are_refused_by_name(tmp_path: Path) -> None:
     file = tmp_path / "policy.safetensors"
     with pytest.raises(ValueError, match="policy.safetensors: cannot be read"):
