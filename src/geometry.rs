@@ -5,6 +5,7 @@
 
 pub(crate) mod area; // polygons with holes
 mod alignment;
+mod circle;
 mod fit;
 mod meeting;
 mod offset;
@@ -18,6 +19,7 @@ use glam::DVec2;
 
 pub use alignment::{Bend, Misfit, rounded, to_circle};
 pub use area::{ROUNDED, counter_clockwise};
+pub(crate) use circle::fitted_circle;
 pub(crate) use fit::arc_of_height;
 pub use fit::{bulging_outline, fitted_line, fitted_outline};
 pub use outline::{Nearby, Outline};

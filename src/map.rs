@@ -7,6 +7,8 @@ pub mod route; // lane centre lines -> waypoints
 pub mod ground; // a ring with its arms: kerb faces, lane edges, routes
 pub mod opendrive; // maps -> rings
 pub mod drawing; // drawings -> rings
+mod arm_names; // names of arms, given or found
+mod kerbs; // whose they are, and what is free between them
 pub mod parametric; // parameters -> kerbs and lanes
 mod road; // a name and its ground
 mod apron; // strips of islands for trailers alone

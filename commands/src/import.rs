@@ -147,7 +147,7 @@ impl Written<'_> {
             origin: [centre.x, centre.y],
             hand: if ground.mirrored { "left" } else { "right" },
             island_radius: (0.0 < ground.island_radius).then_some(ground.island_radius),
-            arms: imported.arm_names(),
+            arms: imported.ground.arm_names(),
             routes: ground.lines.iter().map(route).collect(),
             warnings,
         }
@@ -259,7 +259,7 @@ fn list(file: &Path, map: &Map) -> Result<(), Error> {
             write!(text, "ring {x:.1},{y:.1}: island {:.2} m, within {:.2} m of a circle", ring.radius, ring.residual);
         match map.ground(&ring, &Options::default()) {
             Ok(imported) => {
-                let (arms, routes) = (imported.arm_names().join(" "), imported.ground.lines.len());
+                let (arms, routes) = (imported.ground.arm_names().join(" "), imported.ground.lines.len());
                 let _ = writeln!(text, "; arms {arms}; {routes} routes");
                 drivable += 1;
             }

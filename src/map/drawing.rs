@@ -21,8 +21,8 @@ pub use dxf::Unit;
 use dxf::folded;
 pub use site::Drawn;
 
-use super::opendrive::of_windows_1252;
 use crate::files::reader::{Error, read_bytes};
+use crate::files::windows_1252;
 use crate::geometry::Curve;
 
 /// Most bytes of a drawing.
@@ -85,7 +85,7 @@ fn text(file: &Path, bytes: &[u8]) -> String {
     match std::str::from_utf8(bytes) {
         Ok(text) => text.to_owned(),
         Err(_) if is_geojson(file) => String::from_utf8_lossy(bytes).into_owned(),
-        Err(_) => of_windows_1252(bytes),
+        Err(_) => windows_1252::text(bytes),
     }
 }
 

@@ -25,7 +25,6 @@ mod rings; // where the roundabouts are
 mod crossings; // lanes in and out of a ring, arms
 mod paths; // ways through a ring
 mod bypass; // lanes that pass beside a ring
-mod names; // names of arms
 mod lines; // ways -> routes
 mod surroundings; // a map around a point
 mod bridges; // roads above others
@@ -39,16 +38,11 @@ use glam::DVec2;
 
 use crate::files::reader::{Error, Reader, read_bytes};
 pub use build::{Imported, Options};
-pub(in crate::map) use build::{kerb_of, outer_radius, ring_radius};
-pub(in crate::map) use encoding::of_windows_1252;
 pub use export::exported;
 use graph::Graph;
 pub use junction::{Junction, RoadLane, Way};
 use lanes::Strip;
-pub(in crate::map) use lines::closest;
-pub(in crate::map) use names::{from_east, named};
 use records::Records;
-pub(in crate::map) use rings::fitted_circle;
 pub use rings::{Refused, Ring};
 
 /// Which hand of traffic a map has.

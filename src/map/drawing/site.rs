@@ -8,11 +8,12 @@ use glam::DVec2;
 use super::{Drawing, Entity, Layers, aprons, ways};
 use crate::files::reader::{Error, Reader};
 use crate::geometry::area::densified;
-use crate::geometry::{Curve, Outline, Piece, fitted_line, wrapped};
+use crate::geometry::{Curve, Outline, Piece, fitted_circle, fitted_line, wrapped};
 use crate::map::apron;
+use crate::map::arm_names::{from_east, named};
 use crate::map::chosen::FARTHEST;
 use crate::map::ground::{Arm, Edges, Ground, Kerb, Line};
-use crate::map::opendrive::{closest, fitted_circle, from_east, kerb_of, named, outer_radius, ring_radius};
+use crate::map::kerbs::{closest, kerb_of, outer_radius, ring_radius};
 use crate::map::route::Lane;
 
 /// Ends of lines nearer than this are joined (m).

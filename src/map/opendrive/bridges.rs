@@ -8,9 +8,9 @@ use super::Map;
 use super::lanes::Strip;
 use super::paths::Network;
 use super::records::RoadRecord;
-use super::surroundings::encloses;
 use super::whole::LEVEL;
 use super::xml::shown;
+use crate::geometry::area::encloses;
 
 /// Lanes that overlap with a rise of more than this between them are a bridge and what passes below it (m).
 const CLEARANCE: f64 = 2.5;

@@ -1,7 +1,5 @@
 //! A ring of a map as a [`Ground`]: surface, arms and routes around its centre, as arcs and segments.
 
-use std::f64::consts::{PI, TAU};
-
 use glam::DVec2;
 
 use super::bridges::bridges;
@@ -10,18 +8,18 @@ use super::crossings::{ArmLanes, Crossing, arms, circle, crossings, joined};
 use super::lanes::Strip;
 use super::level::GRADE;
 use super::lines::{CROSSING, Lines, shown};
-use super::names::named;
 use super::paths::Network;
 use super::records::Level;
-use super::rings::fitted_circle;
-use super::surroundings::{self, Part, REACH, clipped, encloses_origin, outline};
+use super::surroundings::{self, Part, REACH, clipped, outline};
 use super::whole::{LEVEL, TILTED};
 use super::{FINEST, Map, Ring};
 use crate::files::reader::{Error, Reader};
-use crate::geometry::area::{Area, counter_clockwise, densified, points, signed_area};
-use crate::geometry::{Curve, Outline, Piece};
+use crate::geometry::area::{Area, counter_clockwise, densified, encloses_origin, points, signed_area};
+use crate::geometry::{Curve, Outline, fitted_circle};
 use crate::map::apron;
-use crate::map::ground::{Arm, Edges, Ground, Kerb};
+use crate::map::arm_names::named;
+use crate::map::ground::{Edges, Ground};
+use crate::map::kerbs::{kerb_of, outer_radius, ring_radius};
 use crate::map::route::Lane;
 
 /// A way through the ring comes as near to its outer kerb as this, inside or outside (m).
@@ -350,48 +348,4 @@ fn drop_passing_lanes(crossings: &mut Vec<Crossing>, network: &Network, reach: f
         format!("{} passes the ring by too far from it, and is left out", names.join(", "))
     };
     dropped.map(told).collect()
-}
-
-/// Radius of the ring's outer kerb: the island's and what is free beyond it between the arms.
-pub(in crate::map) fn outer_radius(faces: &Outline, island_radius: f64) -> f64 {
-    let mut free: Vec<f64> = (0..180)
-        .map(|i| {
-            let out = DVec2::from_angle(f64::from(i) * TAU / 180.0);
-            faces.ray(out * (island_radius + 0.5), out, 50.0)
-        })
-        .filter(|&free| 2.0 < free)
-        .collect();
-    free.sort_by(f64::total_cmp);
-    // A quarter of the angles at least lies between the mouths.
-    let between = free.get(free.len() / 8).copied().unwrap_or(4.0);
-    island_radius + 0.5 + between
-}
-
-/// Radius at which a line follows the ring: the middle of its distances from the centre (m).
-pub(in crate::map) fn ring_radius(line: &[DVec2], island_radius: f64, outer_radius: f64) -> f64 {
-    let mut radii: Vec<f64> = Vec::new();
-    for pair in line.windows(2) {
-        let middle = (pair[0] + pair[1]) / 2.0;
-        let turning = middle.normalize_or_zero().perp_dot((pair[1] - pair[0]).normalize_or_zero());
-        if middle.length() < outer_radius && 0.9 < turning {
-            radii.push(middle.length());
-        }
-    }
-    radii.sort_by(f64::total_cmp);
-    radii.get(radii.len() / 2).copied().unwrap_or((island_radius + outer_radius) / 2.0)
-}
-
-/// What a loop of the kerb faces belongs to.
-pub(in crate::map) fn kerb_of(curve: &Curve, arms: &[Arm]) -> Kerb {
-    let contour: Vec<[f64; 2]> = curve.polyline(0.01).into_iter().map(DVec2::into).collect();
-    if 0.0 < signed_area(&contour) {
-        return Kerb::Outer;
-    }
-    if encloses_origin(&contour) {
-        return Kerb::Island;
-    }
-    let bearing = curve.pieces.iter().map(Piece::start).sum::<DVec2>().to_angle();
-    let apart = |arm: &Arm| (bearing - arm.bearing + PI).rem_euclid(TAU) - PI;
-    let nearest = (0..arms.len()).min_by(|&one, &other| apart(&arms[one]).abs().total_cmp(&apart(&arms[other]).abs()));
-    Kerb::Splitter(nearest.unwrap_or(0))
 }

@@ -2,14 +2,13 @@
 //!
 //! The circle lies outside the ring's own junctions, where lanes that overlap have come together.
 
-use std::f64::consts::{PI, TAU};
-
 use glam::DVec2;
 
 use super::graph::Graph;
 use super::lanes::Strip;
 use super::records::Records;
 use super::rings::NEAR;
+use crate::map::arm_names::from_east;
 
 /// Crossings of lanes in the same direction that are nearer than this are one lane (m).
 const ONE_LANE: f64 = 1.2;
@@ -123,7 +122,7 @@ pub(super) fn arms(crossings: &[Crossing], circle: f64) -> Vec<ArmLanes> {
     // Counter-clockwise, exits come from the kerb and entries towards it.
     arms.iter_mut().for_each(|arm| arm.entries.reverse());
     // An arm that leads east comes first, also if it points a little south.
-    let around = |arm: &ArmLanes| (arm.bearing() + PI / 8.0).rem_euclid(TAU);
+    let around = |arm: &ArmLanes| from_east(arm.bearing());
     arms.sort_by(|one, other| around(one).total_cmp(&around(other)));
     arms
 }

@@ -4,9 +4,8 @@ use std::path::Path;
 
 use super::xml::shown;
 use crate::files::reader::{Error, shortened};
+use crate::files::windows_1252;
 
-/// Characters of Windows-1252 from 0x80 to 0x9f; those of ISO-8859-1 there are control characters, which no map has.
-const WINDOWS_1252: &str = "€\u{fffd}‚ƒ„…†‡ˆ‰Š‹Œ\u{fffd}Ž\u{fffd}\u{fffd}‘’“”•–—˜™š›œ\u{fffd}žŸ";
 /// Where the declaration of an encoding is looked for (bytes).
 const HEAD: usize = 200;
 
@@ -39,7 +38,7 @@ pub(super) fn text(file: &Path, bytes: Vec<u8>) -> Result<String, Error> {
     }
     let encoding = declared(&bytes[..bytes.len().min(HEAD)]);
     if ["iso-8859-1", "latin1", "windows-1252", "cp1252"].contains(&encoding.as_str()) {
-        return Ok(of_windows_1252(&bytes));
+        return Ok(windows_1252::text(&bytes));
     }
     String::from_utf8(bytes).map_err(|error| {
         let at = error.utf8_error().valid_up_to();
@@ -54,13 +53,6 @@ pub(super) fn text(file: &Path, bytes: Vec<u8>) -> Result<String, Error> {
             "is no valid UTF-8 from byte {at} on{declared}; save it as UTF-8 and declare that in its first line"
         ))
     })
-}
-
-/// A text of one byte a character.
-pub(in crate::map) fn of_windows_1252(bytes: &[u8]) -> String {
-    let high: Vec<char> = WINDOWS_1252.chars().collect();
-    let of = |&byte: &u8| if (0x80..0xa0).contains(&byte) { high[usize::from(byte - 0x80)] } else { char::from(byte) };
-    bytes.iter().map(of).collect()
 }
 
 /// The encoding that an XML declaration names, in lower case; empty without one.

@@ -11,10 +11,11 @@ use super::crossings::{ArmLanes, Crossing, arms, crossings};
 use super::lanes::{Strip, sampled};
 use super::lines::CROSSING;
 use super::paths::{Network, Way as Lanes};
-use super::surroundings::{self, Part, REACH, clipped, encloses, outline};
+use super::surroundings::{self, Part, REACH, clipped, outline};
 use super::xml::shown;
 use super::{COARSE, FINEST, Map};
 use crate::files::reader::{Error, Reader};
+use crate::geometry::area::encloses;
 use crate::map::route::Lane;
 
 /// How far beyond its junction the circle lies on which arms begin (m).

@@ -7,6 +7,7 @@ use glam::DVec2;
 
 use super::read::{KERB_WIDTH, RAISED};
 use super::records::{Kind, Lane, Records, RoadRecord, Section, active};
+use super::sections::SHORTEST;
 
 /// Most halvings of the stretch between two records.
 const MOST_HALVINGS: u32 = 9;
@@ -22,8 +23,6 @@ const NARROWEST: f64 = 1.5;
 const FARTHEST: f64 = 1000.0;
 /// A strip that folds over at more samples than this has no shape that could be paved.
 const MOST_FOLDS: usize = 200;
-/// Stretches shorter than this are left out, unless the section has no other (m).
-const SHORTEST: f64 = 1e-6;
 
 /// A lane of a section, in the direction of the reference line.
 #[derive(Debug, Clone)]

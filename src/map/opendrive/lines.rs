@@ -6,17 +6,11 @@ use super::paths::{Network, Way, within};
 use super::surroundings::FITTED;
 use crate::geometry::{Curve, Outline, fitted_line};
 use crate::map::ground::{Arm, Line};
+use crate::map::kerbs::closest;
 use crate::map::route::Lane;
 
 /// Joints that jump further are warned of (m).
 const JUMP: f64 = 0.1;
-/// A centre line that is nearer to a kerb than half a truck's width is warned of (m).
-const NEAREST: f64 = 1.3;
-/// Distance between the points of a line that are compared with kerbs first (m).
-const STEP: f64 = 0.98;
-/// Parts of it, where a kerb may be nearer between two of them.
-const FINER: u32 = 20;
-
 /// Reach of crossing lines to either side of a lane that is in no ring, in widths of the lane: over its neighbours too.
 pub(super) const CROSSING: f64 = 1.5;
 
@@ -101,29 +95,6 @@ fn width(network: &Network, way: &[usize], p: DVec2) -> f64 {
     nearest.map_or(3.5, |((left, right), _)| left.distance(*right))
 }
 
-/// Where a line comes too near to a kerb, away from its ends, and how near it is there (m).
-pub(in crate::map) fn closest(line: &Curve, faces: &Outline) -> Option<(f64, DVec2)> {
-    let span = line.length() - 4.0 * NEAREST;
-    if span < 0.0 {
-        // A short line is all ends.
-        return None;
-    }
-    let n = (span / STEP).ceil() as usize;
-    let step = span / n.max(1) as f64;
-    let near = |along: f64| (faces.signed_distance(line.point_at(2.0 * NEAREST + along)), along);
-    let coarse: Vec<(f64, f64)> = (0..=n).map(|i| near(i as f64 * step)).collect();
-    let nearer = |one: (f64, f64), other: (f64, f64)| if other.0 < one.0 { other } else { one };
-    let mut least = coarse.iter().copied().fold((f64::INFINITY, 0.0), nearer);
-    for pair in coarse.windows(2) {
-        // A distance changes by no more than what is driven: elsewhere between two points there is nothing nearer.
-        if 0.5 * (pair[0].0 + pair[1].0 - step) < least.0 {
-            least =
-                (1..FINER).map(|part| near(pair[0].1 + step * f64::from(part) / f64::from(FINER))).fold(least, nearer);
-        }
-    }
-    Some((least.0, line.point_at(2.0 * NEAREST + least.1))).filter(|(distance, _)| *distance < NEAREST)
-}
-
 /// The centre lines of routes, each lane once.
 pub(super) fn shown(lines: &[Line]) -> Vec<Curve> {
     const SPACING: f64 = 0.5;
@@ -145,33 +116,4 @@ pub(super) fn shown(lines: &[Line]) -> Vec<Curve> {
         }
     }
     shown
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::geometry::Piece;
-
-    #[test]
-    fn a_kerb_is_found_wherever_it_is_along_a_line_of_any_length() {
-        let rectangle = |from: DVec2, to: DVec2| {
-            let corners = [from, DVec2::new(to.x, from.y), to, DVec2::new(from.x, to.y)];
-            let side = |i: usize| Piece::Segment { from: corners[i], to: corners[(i + 1) % 4] };
-            Curve { pieces: (0..4).map(side).collect() }
-        };
-        let short = Curve { pieces: vec![Piece::Segment { from: DVec2::ZERO, to: DVec2::new(4.0, 0.0) }] };
-        let narrow = Outline::new(vec![rectangle(DVec2::new(-9.0, -1.0), DVec2::new(9.0, 1.0))]);
-        assert_eq!(closest(&short, &narrow), None);
-        for length in [20.0, 200.0, 1_000.0] {
-            let line = Curve { pieces: vec![Piece::Segment { from: DVec2::ZERO, to: DVec2::new(length, 0.0) }] };
-            let road = rectangle(DVec2::new(-9.0, -9.0), DVec2::new(length + 9.0, 9.0));
-            assert_eq!(closest(&line, &Outline::new(vec![road.clone()])), None);
-            for at in [3.0, 0.5 * length, length - 3.0] {
-                // A post on the line, wherever the points lie, is as near as its middle.
-                let post = rectangle(DVec2::new(at - 0.2, -0.2), DVec2::new(at + 0.2, 0.2));
-                let (distance, place) = closest(&line, &Outline::new(vec![road.clone(), post])).unwrap();
-                assert!((distance + 0.2).abs() < 0.03 && (place.x - at).abs() < 0.05, "{at}: {distance} {place}");
-            }
-        }
-    }
 }

@@ -82,18 +82,3 @@ pub(super) fn nearby(map: &Map, centre: DVec2, extent: f64, tolerance: f64) -> V
     }
     found
 }
-
-/// Whether the origin lies within a contour.
-pub(super) fn encloses_origin(contour: &[[f64; 2]]) -> bool {
-    encloses(contour, DVec2::ZERO)
-}
-
-/// Whether a point lies within a contour.
-pub(super) fn encloses(contour: &[[f64; 2]], p: DVec2) -> bool {
-    let n = contour.len();
-    let crosses = |i: &usize| {
-        let (from, to) = (DVec2::from(contour[*i]) - p, DVec2::from(contour[(*i + 1) % n]) - p);
-        (from.y <= 0.0) != (to.y <= 0.0) && 0.0 < from.x + (to.x - from.x) * -from.y / (to.y - from.y)
-    };
-    (0..n).filter(crosses).count() % 2 == 1
-}

@@ -2,8 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::build::Imported;
-use crate::map::ground::Arm;
+use super::ground::{Arm, Ground};
 
 /// A bearing as the road is seen: in the mirror image of a map its arms follow each other clockwise (rad).
 fn in_map(bearing: f64, mirrored: bool) -> f64 {
@@ -11,7 +10,7 @@ fn in_map(bearing: f64, mirrored: bool) -> f64 {
 }
 
 /// A bearing counted from where east begins, so that one just below 360 deg comes first (rad).
-pub(in crate::map) fn from_east(bearing: f64) -> f64 {
+pub(super) fn from_east(bearing: f64) -> f64 {
     (bearing + PI / 8.0).rem_euclid(TAU)
 }
 
@@ -23,18 +22,18 @@ fn order(bearings: &[f64], mirrored: bool) -> Vec<usize> {
     order
 }
 
-impl Imported {
+impl Ground {
     /// Names of its arms in the order in which they are given: counter-clockwise from east as the road is seen.
     pub fn arm_names(&self) -> Vec<&str> {
-        let arms = &self.ground.arms;
+        let arms = &self.arms;
         let bearings: Vec<f64> = arms.iter().map(|arm| arm.bearing).collect();
-        order(&bearings, self.ground.mirrored).into_iter().map(|arm| arms[arm].name.as_str()).collect()
+        order(&bearings, self.mirrored).into_iter().map(|arm| arms[arm].name.as_str()).collect()
     }
 }
 
 /// The arms at these bearings (rad) with their names, or what is wrong with those that are given, which follow each
 /// other counter-clockwise from east as the road is seen; none is given where they are to be found.
-pub(in crate::map) fn named(bearings: &[f64], given: &[String], mirrored: bool) -> Result<Vec<Arm>, String> {
+pub(super) fn named(bearings: &[f64], given: &[String], mirrored: bool) -> Result<Vec<Arm>, String> {
     let bearings: Vec<f64> = bearings.iter().map(|bearing| bearing.rem_euclid(TAU)).collect();
     let in_map = |bearing: f64| in_map(bearing, mirrored);
     let order = order(&bearings, mirrored);
