@@ -16,6 +16,7 @@ use offtrack_evaluation::page::Page;
 use offtrack_evaluation::possible::to_search;
 use offtrack_evaluation::recording::Of;
 use offtrack_evaluation::report::{Episode, Report, Summary};
+use offtrack_evaluation::run_file::RunFile;
 use offtrack_evaluation::{Driven, Evaluation, Sequences, legend, usual_episodes};
 use offtrack_evaluation::{files, provenance};
 use serde::Serialize;
@@ -256,7 +257,7 @@ fn printed(report: &Report, episodes: usize) -> String {
 
 /// A run's report, and the text of its metrics.csv.
 fn read_run(folder: &Path) -> Result<(Value, Option<String>), Error> {
-    let [report, metrics] = ["report.json", "metrics.csv"].map(|name| folder.join(name));
+    let [report, metrics] = [RunFile::Report, RunFile::Metrics].map(|file| file.of(folder));
     let wrong = |message: String| Error::contents(&report, message);
     let text = reader::read_text(&report, RUN_LIMIT)?;
     let run: Value =

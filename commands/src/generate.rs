@@ -8,11 +8,11 @@ use offtrack::files::shipped::Kind;
 use offtrack::map::procedural::{Distribution, RandomRoad, Reason, Refused, lane_clearance};
 use offtrack::map::{Road, opendrive};
 use offtrack_drawing::histograms::{Histograms, Panel};
-use offtrack_drawing::{rasterised, sheet};
+use offtrack_drawing::sheet;
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 
-use crate::{outputs, roads};
+use crate::{outputs, plot, roads};
 
 /// Roads drawn at most.
 const MOST: u32 = 100_000;
@@ -70,15 +70,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
         let expected = format!("must be at most {} for so many roads", u32::MAX - (args.count - 1));
         return Err(Error::Setting { name: "--first", value: args.first.to_string(), expected });
     };
-    if let Some(plot) = &args.plot
-        && !plot.extension().is_some_and(|extension| extension == "svg" || extension == "png")
-    {
-        return Err(Error::Setting {
-            name: "--plot",
-            value: plot.display().to_string(),
-            expected: "must end in .svg or .png".into(),
-        });
-    }
+    args.plot.as_ref().map(|file| plot::check("--plot", file)).transpose()?;
     let of_sheet = args.output.iter().flat_map(|folder| SHEETS.map(|name| folder.join(name))).collect::<Vec<_>>();
     let read: Vec<outputs::Named> = of_sheet.iter().map(|file| ("--output", Some(file.as_path()))).collect();
     let distribution = [("--distribution", Some(Path::new(&args.distribution)))];
@@ -99,7 +91,8 @@ pub fn run(args: &Args) -> Result<(), Error> {
             Err(error) => refused.push(format!("no map of it is written: {error}")),
         }
     }
-    let plot = args.plot.as_ref().map(|file| picture(file, &histograms(&distribution, args, &roads)?)).transpose()?;
+    let drawn = |file| plot::bytes(file, Ok(histograms(&distribution, args, &roads)?), WIDTH);
+    let plot = args.plot.as_deref().map(drawn).transpose()?;
     if let Some(folder) = &args.output {
         let file = |road: &RandomRoad| {
             (
@@ -168,15 +161,8 @@ fn sheets(
     let title = format!("{of}: distribution {}, seed {}", distribution.name, args.seed);
     let svg = sheet::drawn(&title, &shown)
         .map_err(|error| Error::write(&folder.join(SHEETS[0]))(std::io::Error::other(error)))?;
-    SHEETS.into_iter().map(|name| Ok((name.to_owned(), picture(&folder.join(name), &svg)?))).collect()
-}
-
-/// A picture in the format that the file's name asks for.
-fn picture(file: &Path, svg: &str) -> Result<Vec<u8>, Error> {
-    if file.extension().is_some_and(|extension| extension == "png") {
-        return rasterised(svg, WIDTH).map_err(|error| Error::write(file)(std::io::Error::other(error)));
-    }
-    Ok(svg.as_bytes().to_vec())
+    let bytes = |name: &str| plot::bytes(&folder.join(name), Ok(svg.clone()), WIDTH);
+    SHEETS.into_iter().map(|name| Ok((name.to_owned(), bytes(name)?))).collect()
 }
 
 /// Histograms of the roads with the shipped roundabouts marked, as SVG text.

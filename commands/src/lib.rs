@@ -13,6 +13,7 @@ pub mod fits;
 pub mod generate;
 pub mod import;
 pub mod outputs; // files to write: each its own
+pub mod plot; // pictures by the names of their files
 mod policies; // flags: which policy
 pub mod program; // arguments read, a command run, its exit code
 pub mod progress; // the bar on a terminal

@@ -5,23 +5,15 @@ use std::path::{Path, PathBuf};
 use offtrack::files::reader::{TEXT_LIMIT, read_text, shown_path};
 use offtrack::files::writer::Output;
 use offtrack_evaluation::error::Error;
+use offtrack_evaluation::run_file::RunFile;
 use toml::Value;
 
 /// A flag and the file that it names, if it is given.
 pub type Named<'a> = (&'static str, Option<&'a Path>);
 
 /// Files of a training run in its folder, which commands read or with which it goes on.
-pub fn of_run(folder: &Path) -> [PathBuf; 7] {
-    [
-        "config.toml",
-        "metrics.csv",
-        "report.json",
-        "routes.csv",
-        "policy.safetensors",
-        "checkpoint.safetensors",
-        "policies/policies.json",
-    ]
-    .map(|name| folder.join(name))
+pub fn of_run(folder: &Path) -> impl Iterator<Item = PathBuf> {
+    RunFile::ALL.into_iter().filter(|file| *file != RunFile::Page).map(move |file| file.of(folder))
 }
 
 /// Files that lead from one to the next by the names in them, at most: a benchmark, a roundabout, its map.

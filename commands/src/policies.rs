@@ -13,6 +13,7 @@ use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 use offtrack_evaluation::policies::rule::{self, FOLLOWS, YIELDS};
 use offtrack_evaluation::policies::{self, Controller, LOOK_AHEAD, PurePursuit};
+use offtrack_evaluation::run_file::RunFile;
 
 use crate::outputs;
 
@@ -84,7 +85,7 @@ impl Choice {
 
     /// An error unless the policy is the one that the training run in `folder` has left.
     pub fn check_is_of(&self, folder: &Path, scenario: &Scenario, world: &World) -> Result<(), Error> {
-        let of_run = folder.join("policy.safetensors");
+        let of_run = RunFile::Policy.of(folder);
         let learned = match self.policy.as_deref() {
             Some(name) if WITHOUT_FILE.contains(&name) || rule::under(name).is_some() => None,
             Some(name) => Some(policies::learned(name)?),

@@ -21,7 +21,7 @@ use offtrack_evaluation::files;
 
 use crate::import::PlaceArgs;
 use crate::progress::Bar;
-use crate::{outputs, roads};
+use crate::{outputs, plot, roads};
 
 /// Steps of a minute.
 const STEPS_A_MINUTE: u32 = 600;
@@ -71,7 +71,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
     within("--minutes", args.minutes, 1, 1_440)?;
     within("--runs", args.runs, 1, 1_000)?;
     if let Some(plot) = &args.plot {
-        capacity::check_plot(plot)?;
+        plot::check("--plot", plot)?;
     }
     let read: Vec<outputs::Named> = args.roads.iter().map(|road| ("ROAD", Some(Path::new(road)))).collect();
     outputs::distinct(&[("--json", args.json.as_deref()), ("--plot", args.plot.as_deref())], &read)?;

@@ -11,6 +11,7 @@ use offtrack_evaluation::kept::{self, Kept};
 use offtrack_evaluation::live::bake::STAMP;
 use offtrack_evaluation::live::{self, Ground, Live, Part, TrainingRun};
 use offtrack_evaluation::policies::{self, rule};
+use offtrack_evaluation::run_file::RunFile;
 use offtrack_policy::Policy;
 
 use crate::{outputs, roads};
@@ -104,10 +105,10 @@ pub fn run(args: &Args) -> Result<(), Error> {
 /// The policies of the training run in a folder, each named by its file.
 fn training_run(folder: &Path) -> Result<TrainingRun, Error> {
     let wrong = |expected: String| Error::Setting { name: "--run", value: folder.display().to_string(), expected };
-    if !folder.join("config.toml").is_file() {
+    if !RunFile::Config.of(folder).is_file() {
         return Err(wrong("the folder of a run is needed, with the config.toml that it left".to_owned()));
     }
-    let left = folder.join("policy.safetensors");
+    let left = RunFile::Policy.of(folder);
     if !kept::list(folder).is_file() {
         return Err(wrong(format!(
             "it keeps no policies, as a run does from its first update on: --policy {} shows the one that it left",

@@ -9,6 +9,7 @@ use offtrack::files::reader::read_bytes;
 use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
+use crate::run_file::RunFile;
 
 /// Most policies that a run keeps.
 pub const MOST: usize = 16;
@@ -41,7 +42,7 @@ pub fn folder(run: &Path) -> PathBuf {
 
 /// The list of those that the run in this folder keeps.
 pub fn list(run: &Path) -> PathBuf {
-    folder(run).join("policies.json")
+    RunFile::Kept.of(run)
 }
 
 /// The policies that the run in this folder keeps, by their env steps.

@@ -64,6 +64,7 @@ pub mod outcomes; // how each episode ended
 pub mod comparison; // evaluations in pairs
 pub mod board; // entries that are simulated again
 pub mod kept; // the policies that a training run keeps on its way
+pub mod run_file; // names of a training run's files
 pub mod shown; // which episodes a page shows
 pub mod page; // a report as an HTML page
 pub mod live; // trucks that drive in a browser, as an HTML page

@@ -19,7 +19,7 @@ use offtrack_learner::error::Error;
 use offtrack_learner::session::Session;
 use serde::Serialize;
 
-use super::scale::median;
+use super::scale::{median, rounded};
 
 /// The benchmark whose transitions are learned from.
 const BENCHMARK: &str = "attard2023-training";
@@ -202,8 +202,4 @@ impl Learner {
         }
         Ok(begun.elapsed().as_secs_f64() / n as f64)
     }
-}
-
-fn rounded(value: f64) -> f64 {
-    (1000.0 * value).round() / 1000.0
 }

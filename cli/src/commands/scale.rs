@@ -15,8 +15,8 @@ use offtrack::layout::N_RAYS;
 use offtrack::scenario::Split;
 use serde::Serialize;
 
-pub(crate) use measure::median;
 use measure::{Measured, measured};
+pub(crate) use measure::{median, rounded};
 use mode::{Learner, Mode, Setting};
 use offtrack_commands::{devices as device, outputs, roads};
 use offtrack_evaluation::files;
@@ -156,7 +156,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
         return Err(Error::setting("--seconds", format!("{} s", args.seconds), "must lie in 0.1..3600 s"));
     }
     if let Some(file) = &args.plot {
-        plot::check(file)?;
+        offtrack_commands::plot::check("--plot", file)?;
     }
     if let Some(file) = args.config.as_ref().filter(|_| !args.mode.contains(&Mode::Training)) {
         let expected = "is for --mode training: add that mode, or leave --config out".to_owned();
@@ -293,21 +293,9 @@ fn write(args: &Args, scale: &Scale, title: &str) -> Result<(), Error> {
         files::write_json(file, scale)?;
     }
     if let Some(file) = &args.plot {
-        let svg = plot::drawn(scale, title).map_err(failed(file))?;
-        let bytes = if plot::is_png(file) {
-            offtrack_drawing::rasterised(&svg, plot::PNG_WIDTH).map_err(failed(file))?
-        } else {
-            svg.into_bytes()
-        };
-        files::write_whole(file, &bytes)?;
+        offtrack_commands::plot::write(file, plot::drawn(scale, title), plot::PNG_WIDTH)?;
     }
     Ok(())
-}
-
-/// For `map_err` on a picture being drawn.
-fn failed(file: &Path) -> impl FnOnce(offtrack_drawing::Error) -> Error {
-    let error = Error::write(file);
-    move |source| error(std::io::Error::other(source))
 }
 
 fn heading(scale: &Scale, device: &offtrack_evaluation::device::Device) -> String {

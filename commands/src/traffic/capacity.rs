@@ -1,7 +1,6 @@
 //! Capacities of entry lanes beside circulating flows, and their plot.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use glam::DVec2;
 use offtrack::layout::Stream;
@@ -9,13 +8,13 @@ use offtrack::traffic::hcm::Lane;
 use offtrack::traffic::survey::{Counts, Saturated};
 use offtrack::traffic::{Mix, Rules, Survey};
 use offtrack_drawing::chart::{Chart, Kind, LINES, Line, Panel, Scales};
-use offtrack_drawing::rasterised;
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{Args, LargeShare, Place, STEPS_A_MINUTE, bar, rounded, setting, table, taken_away, write_json};
+use crate::plot;
 
 /// Circulating flows (veh/h).
 const FLOWS: [f64; 5] = [0.0, 300.0, 600.0, 900.0, 1200.0];
@@ -51,12 +50,6 @@ struct Case<'a> {
     survey: &'a Survey<'a>,
     flow: usize,
     saturated: Saturated,
-}
-
-pub(super) fn check_plot(plot: &Path) -> Result<(), Error> {
-    let is_picture = plot.extension().is_some_and(|extension| extension == "svg" || extension == "png");
-    let value = plot.display().to_string();
-    if is_picture { Ok(()) } else { Err(setting("--plot", &value, "must end in .svg or .png")) }
 }
 
 /// Runs the command with --capacity.
@@ -100,13 +93,8 @@ pub(super) fn run(args: &Args, places: &[Place], mix: Mix) -> Result<(), Error> 
     let points: Vec<(Lane, Point)> = found.collect::<Vec<_>>().into_iter().flatten().collect();
     drop(bar);
     files::print(&text(&points))?;
-    if let Some(plot) = &args.plot {
-        let drawn = chart(args, &points).drawn().and_then(|svg| {
-            let is_png = plot.extension().is_some_and(|extension| extension == "png");
-            if is_png { rasterised(&svg, WIDTH) } else { Ok(svg.into_bytes()) }
-        });
-        let bytes = drawn.map_err(|error| Error::write(plot)(std::io::Error::other(error)))?;
-        files::write_whole(plot, &bytes)?;
+    if let Some(file) = &args.plot {
+        plot::write(file, chart(args, &points).drawn(), WIDTH)?;
     }
     write_json(args, &points.iter().map(|(_, point)| point).collect::<Vec<_>>())
 }

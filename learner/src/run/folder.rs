@@ -7,6 +7,7 @@ use offtrack::files::writer::followed;
 use crate::config::Config;
 use crate::error::Error;
 use offtrack_evaluation::files;
+use offtrack_evaluation::run_file::RunFile;
 
 /// Maximum length of a run's name: a file system's, 255, less what is put after it.
 const LONGEST_NAME: usize = 200;
@@ -76,12 +77,12 @@ impl Folder {
 
     /// The training file as used.
     pub fn config(&self) -> PathBuf {
-        self.0.join("config.toml")
+        RunFile::Config.of(&self.0)
     }
 
     /// All that it takes to continue, replaced in one move each time.
     pub fn checkpoint(&self) -> PathBuf {
-        self.0.join("checkpoint.safetensors")
+        RunFile::Checkpoint.of(&self.0)
     }
 
     /// The next checkpoint while it is being written: beside the last one, also where that is kept elsewhere and
@@ -97,27 +98,27 @@ impl Folder {
 
     /// The policy, replaced in one move each time.
     pub fn policy(&self) -> PathBuf {
-        self.0.join("policy.safetensors")
+        RunFile::Policy.of(&self.0)
     }
 
     /// A row of metrics every few seconds.
     pub fn metrics(&self) -> PathBuf {
-        self.0.join("metrics.csv")
+        RunFile::Metrics.of(&self.0)
     }
 
     /// Success on each training route.
     pub fn routes(&self) -> PathBuf {
-        self.0.join("routes.csv")
+        RunFile::Routes.of(&self.0)
     }
 
     /// The report.
     pub fn report(&self) -> PathBuf {
-        self.0.join("report.json")
+        RunFile::Report.of(&self.0)
     }
 
     /// The report as a page to look at.
     pub fn page(&self) -> PathBuf {
-        self.0.join("report.html")
+        RunFile::Page.of(&self.0)
     }
 }
 

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use offtrack::files::reader::read_text;
 use offtrack_evaluation::files;
+use offtrack_evaluation::run_file::RunFile;
 use offtrack_evaluation::seeds::{SeedReport, Seeds};
 use serde::Deserialize;
 
@@ -159,7 +160,7 @@ impl Group {
             return Err(Error::setting("--seeds", shown(seeds), expected));
         }
         for &seed in seeds {
-            let file = self.folder(seed).join("config.toml");
+            let file = RunFile::Config.of(&self.folder(seed));
             if !file.is_file() {
                 continue;
             }
@@ -176,7 +177,7 @@ impl Group {
 
     /// A seed's report if it has been trained and evaluated.
     fn finished(&self, seed: u32) -> Result<Option<SeedReport>, Error> {
-        let file = self.folder(seed).join("report.json");
+        let file = RunFile::Report.of(&self.folder(seed));
         if !file.is_file() {
             return Ok(None);
         }
@@ -207,7 +208,7 @@ impl Group {
     /// A seed's folder: a new one, or that of a run that was begun.
     fn open(&self, seed: u32, file: &Path, config: &Config) -> Result<Opened, Error> {
         let path = self.folder(seed);
-        if path.join("config.toml").is_file() {
+        if RunFile::Config.of(&path).is_file() {
             return Ok(Resumed::open(&path, None, None)?.into());
         }
         // A run that was killed as it made its folder left it empty.

@@ -16,31 +16,47 @@ pub(super) fn too_large(reader: &Reader, key: &str, radius: f64, largest: f64) -
     )
 }
 
-/// An alignment that gives no curve. `corner` is the key of the arc between this arm and the next, if there is one.
-pub(super) fn fault(
-    reader: &Reader,
-    arms: &[Arm],
-    arm: usize,
-    corner: Option<&str>,
-    part: &str,
-    way: Way,
-    fault: Fault,
-) -> Error {
-    let next = (arm + 1) % arms.len();
-    let alignment = |arm: usize, way: Way| {
-        let carriageway = arms[arm].way(way);
-        match part {
-            "left" => carriageway.lane(Lane::Left),
-            "right" => carriageway.lane(Lane::Right),
-            _ => &carriageway.kerb,
+/// What of a carriageway is aligned.
+#[derive(Clone, Copy)]
+pub(super) enum Part {
+    Kerb,
+    Lane(Lane),
+}
+
+impl Part {
+    fn name(self) -> &'static str {
+        match self {
+            Part::Kerb => "kerb",
+            Part::Lane(lane) => lane.name(),
         }
+    }
+}
+
+/// An alignment: a part of an arm's entry or exit.
+#[derive(Clone, Copy)]
+pub(super) struct Aligned {
+    pub(super) arm: usize,
+    pub(super) way: Way,
+    pub(super) part: Part,
+}
+
+/// An alignment that gives no curve.
+pub(super) fn fault(reader: &Reader, arms: &[Arm], Aligned { arm, way, part }: Aligned, fault: Fault) -> Error {
+    let next = (arm + 1) % arms.len();
+    let alignment = |arm: usize, way: Way| match part {
+        Part::Kerb => &arms[arm].way(way).kerb,
+        Part::Lane(lane) => arms[arm].way(way).lane(lane),
     };
+    let name = part.name();
     let point = |arm: usize, way: Way, point: usize, largest: f64| {
-        let key = format!("arm[{arm}].{}.{part}.points[{point}].radius", way.name());
+        let key = format!("arm[{arm}].{}.{name}.points[{point}].radius", way.name());
         too_large(reader, &key, alignment(arm, way).bends[point + 1].radius, largest)
     };
-    let corner_key = format!("arm[{arm}].{}", corner.unwrap_or("corner"));
-    let corner_radius = if part == "kerb" { arms[arm].kerb_corner } else { arms[arm].lane_corner }.unwrap_or_default();
+    let (corner, corner_radius) = match part {
+        Part::Kerb => ("kerb_radius", arms[arm].kerb_corner),
+        Part::Lane(_) => ("lane_radius", arms[arm].lane_corner),
+    };
+    let (corner_key, corner_radius) = (format!("arm[{arm}].corner.{corner}"), corner_radius.unwrap_or_default());
     match fault {
         Fault::Point(index, largest) => point(arm, way, index, largest),
         Fault::NextPoint(index, largest) => point(next, Way::Exit, index, largest),
@@ -51,7 +67,7 @@ pub(super) fn fault(
             format!("the last straights of {} and {} do not meet ahead of both", arms[arm].name, arms[next].name),
         ),
         Fault::Ring => reader.invalid(
-            format!("arm[{arm}].{}.{part}.ring_radius", way.name()),
+            format!("arm[{arm}].{}.{name}.ring_radius", way.name()),
             format_args!("{} m", shown(alignment(arm, way).ring_radius)),
             "no such arc leads the last straight into the ring after the last point: aim nearer to the centre or \
              change the radius",

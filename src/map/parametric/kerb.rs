@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use glam::DVec2;
 
 use super::alignment::{Fault, Way, around, ring_arc};
-use super::faults;
+use super::faults::{self, Aligned, Part};
 use super::ring::Ring;
 use super::roundabout_keys::Arm;
 use crate::files::reader::{Error, Reader, differing, shown};
@@ -56,15 +56,15 @@ pub(super) fn corner(reader: &Reader, ring: &Ring, arms: &[Arm], index: usize) -
     let next_index = (index + 1) % arms.len();
     let (arm, next) = (&arms[index], &arms[next_index]);
     let (entry, exit) = (&arm.entry.kerb, &next.exit.kerb);
+    let of = |arm: usize, way: Way| Aligned { arm, way, part: Part::Kerb };
+    let failed = |of: Aligned| move |fault: Fault| faults::fault(reader, arms, of, fault);
     if let Some(radius) = arm.kerb_corner {
-        let fault = |fault| faults::fault(reader, arms, index, Some("corner.kerb_radius"), "kerb", Way::Entry, fault);
-        return around((entry, arm.bearing), (exit, next.bearing), radius).map_err(fault);
+        let joined = around((entry, arm.bearing), (exit, next.bearing), radius);
+        return joined.map_err(failed(of(index, Way::Entry)));
     }
     let circle = ring.outer();
-    let (inward, arrival) =
-        entry.lead(circle).map_err(|fault| faults::fault(reader, arms, index, None, "kerb", Way::Entry, fault))?;
-    let (outward, leaving) =
-        exit.lead(circle).map_err(|fault| faults::fault(reader, arms, next_index, None, "kerb", Way::Exit, fault))?;
+    let (inward, arrival) = entry.lead(circle).map_err(failed(of(index, Way::Entry)))?;
+    let (outward, leaving) = exit.lead(circle).map_err(failed(of(next_index, Way::Exit)))?;
     let between = (next.bearing - arm.bearing).rem_euclid(TAU);
     let sweep = between - leaving - arrival;
     if sweep < 0.0 {
@@ -73,7 +73,7 @@ pub(super) fn corner(reader: &Reader, ring: &Ring, arms: &[Arm], index: usize) -
     if TAU < sweep {
         // The straight passes the ring by, and its arc comes to it from behind.
         let (arm, way) = if arrival <= leaving { (index, Way::Entry) } else { (next_index, Way::Exit) };
-        return Err(faults::fault(reader, arms, arm, None, "kerb", way, Fault::Ring));
+        return Err(failed(of(arm, way))(Fault::Ring));
     }
     let mut curve = Way::Entry.placed(&inward, arm.bearing);
     if 1e-9 < sweep {

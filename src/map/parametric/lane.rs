@@ -8,7 +8,7 @@ use std::ops::RangeInclusive;
 use glam::DVec2;
 
 use super::alignment::{Way, around, ring_arc};
-use super::faults;
+use super::faults::{self, Aligned, Part};
 use super::kerb::corner;
 use super::ring::Ring;
 use super::roundabout_keys::Arm;
@@ -86,7 +86,7 @@ impl Lanes {
             let circle = ring.lane_radius(lane.index());
             let fault = |fault| match carriageway.lanes.len() <= lane.index() {
                 true => faults::no_merge(reader, arms, index, circle),
-                false => faults::fault(reader, arms, index, None, lane.name(), way, fault),
+                false => faults::fault(reader, arms, Aligned { arm: index, way, part: Part::Lane(lane) }, fault),
             };
             let (curve, arrival) = carriageway.lane(lane).lead(circle).map_err(fault)?;
             let curve = way.placed(&curve, arm.bearing);
@@ -178,10 +178,9 @@ fn first_exit(reader: &Reader, ring: &Ring, arms: &[Arm], index: usize) -> Resul
     let (arm, next) = (&arms[index], &arms[(index + 1) % arms.len()]);
     if let Some(radius) = arm.lane_corner {
         let (entry, exit) = (arm.entry.lane(Lane::Right), next.exit.lane(Lane::Right));
-        let fault = |fault| {
-            faults::fault(reader, arms, index, Some("corner.lane_radius"), Lane::Right.name(), Way::Entry, fault)
-        };
-        return around((entry, arm.bearing), (exit, next.bearing), radius).map(Some).map_err(fault);
+        let of = Aligned { arm: index, way: Way::Entry, part: Part::Lane(Lane::Right) };
+        let joined = around((entry, arm.bearing), (exit, next.bearing), radius);
+        return joined.map(Some).map_err(|fault| faults::fault(reader, arms, of, fault));
     }
     if arm.kerb_corner.is_none() || arm.lane_on_ring {
         return Ok(None);

@@ -173,6 +173,6 @@ pub(crate) fn median(values: &mut [f64]) -> f64 {
 }
 
 /// Rounded to a thousandth: on a large device a stage takes less than a tenth of a nanosecond a truck.
-fn rounded(value: f64) -> f64 {
+pub(crate) fn rounded(value: f64) -> f64 {
     (1000.0 * value).round() / 1000.0
 }

@@ -1,30 +1,14 @@
 //! The result as a picture: speed against the number of trucks, and where a step's time goes.
 
-use std::path::Path;
-
 use glam::DVec2;
 
 use super::measure::STAGE_NAMES;
 use super::mode::Mode;
 use super::{Measured, Scale};
 use offtrack_drawing::chart::{Chart, Kind, LINES, Line, Panel, Scales};
-use offtrack_learner::error::Error;
 
 /// Width of a PNG (px).
 pub(super) const PNG_WIDTH: u32 = 1600;
-
-/// Whether a picture can be written under this name.
-pub(super) fn check(file: &Path) -> Result<(), Error> {
-    match file.extension().and_then(|extension| extension.to_str()) {
-        Some("svg" | "png") => Ok(()),
-        _ => Err(Error::setting("--plot", file.display().to_string(), "must end in .svg or .png")),
-    }
-}
-
-/// Whether the plot is to be pixels.
-pub(super) fn is_png(file: &Path) -> bool {
-    file.extension().is_some_and(|extension| extension == "png")
-}
 
 /// The picture as SVG text; `device` is the name of what stepped the trucks.
 pub(super) fn drawn(scale: &Scale, device: &str) -> Result<String, offtrack_drawing::Error> {
