@@ -72,30 +72,34 @@ def check_order(name: str, given: object, needed: str) -> None:
         raise TypeError(f"{name}: {type(given).__name__}; {needed}")
 
 
+def begun(name: str, given: Iterable[Any], most: int, needed: str) -> list[Any]:
+    """The first ``most`` things of what is given, however long it is."""
+    try:
+        return list(itertools.islice(given, most))
+    except TypeError:
+        raise TypeError(f"{name}: {given!r}; {needed}") from None
+
+
 def names_of(routes: Iterable[str]) -> list[str]:
     """Names of routes as a list."""
     if isinstance(routes, str):
         return [text("routes", routes)]
     check_order("routes", routes, "a sequence is needed: random roads and roads of files stand in its order")
-    try:
-        names = list(itertools.islice(routes, MOST_NAMES + 1))
-    except TypeError:
-        raise TypeError(f"routes: {routes!r}; names of routes or roundabouts are needed") from None
+    needed = "names of routes or roundabouts are needed"
+    names = begun("routes", routes, MOST_NAMES + 1, needed)
     if len(names) > MOST_NAMES:
         raise ValueError(f"routes: more than {MOST_NAMES} names")
     wrong = next((name for name in names if not isinstance(name, str)), None)
     if wrong is not None:
-        raise TypeError(f"routes: {wrong!r}; names of routes or roundabouts are needed")
+        raise TypeError(f"routes: {wrong!r}; {needed}")
     return [text("routes", name) for name in names]
 
 
 def names_of_values(values: Iterable[str]) -> list[str]:
     """Names of values as a list."""
     check_order("values", values, "a sequence is needed: a network reads them in its order")
-    try:
-        names = [values] if isinstance(values, str) else list(itertools.islice(values, MOST_VALUES + 1))
-    except TypeError:
-        raise TypeError(f"values: {values!r}; names of values are needed") from None
+    given = [values] if isinstance(values, str) else values
+    names = begun("values", given, MOST_VALUES + 1, "names of values are needed")
     if len(names) > MOST_VALUES:
         raise ValueError(f"values: more than {MOST_VALUES} names")
     return [text("values", name) for name in names]
@@ -116,10 +120,7 @@ def trucks_of(envs: Iterable[int], num_envs: int) -> list[int]:
     """Trucks that begin, each once: no more than there are, however long what was given is."""
     needed = "a sequence of indices of trucks is needed, or None for all"
     check_order("envs", envs, needed)
-    try:
-        given = list(itertools.islice(envs, num_envs + 1))
-    except TypeError:
-        raise TypeError(f"envs: {envs!r}; {needed}") from None
+    given = begun("envs", envs, num_envs + 1, needed)
     if len(given) > num_envs:
         raise ValueError(f"envs: more than {num_envs} of them; the batch has as many trucks")
     indices = [checked_integer(f"envs[{index}]", env) for index, env in enumerate(given)]
