@@ -109,7 +109,7 @@ fn training_run(folder: &Path) -> Result<TrainingRun, Error> {
         return Err(wrong("the folder of a run is needed, with the config.toml that it left".to_owned()));
     }
     let left = RunFile::Policy.of(folder);
-    if !kept::list(folder).is_file() {
+    if !RunFile::Kept.of(folder).is_file() {
         return Err(wrong(format!(
             "it keeps no policies, as a run does from its first update on: --policy {} shows the one that it left",
             left.display()

@@ -40,18 +40,13 @@ pub fn folder(run: &Path) -> PathBuf {
     run.join("policies")
 }
 
-/// The list of those that the run in this folder keeps.
-pub fn list(run: &Path) -> PathBuf {
-    RunFile::Kept.of(run)
-}
-
 /// The policies that the run in this folder keeps, by their env steps.
 ///
 /// # Errors
 ///
 /// No list, or one that is damaged.
 pub fn read(run: &Path) -> Result<Vec<Kept>, Error> {
-    let file = list(run);
+    let file = RunFile::Kept.of(run);
     let wrong = |what: String| {
         let would_do = format!("put a copy of it back, or remove {} to go without", folder(run).display());
         Error::contents(&file, format!("is not the list of a run's policies, or is damaged: {what}; {would_do}"))
@@ -85,7 +80,7 @@ mod tests {
     fn refused(text: &str) -> String {
         let run = tempfile::tempdir().unwrap();
         std::fs::create_dir(folder(run.path())).unwrap();
-        std::fs::write(list(run.path()), text).unwrap();
+        std::fs::write(RunFile::Kept.of(run.path()), text).unwrap();
         read(run.path()).unwrap_err().to_string()
     }
 
@@ -94,7 +89,7 @@ mod tests {
         let run = tempfile::tempdir().unwrap();
         std::fs::create_dir(folder(run.path())).unwrap();
         let written = [kept(400), Kept { validation: Some(0.25), ..kept(1_000_000_000_000) }];
-        files::write_json(&list(run.path()), &written).unwrap();
+        files::write_json(&RunFile::Kept.of(run.path()), &written).unwrap();
         assert_eq!(read(run.path()).unwrap(), written);
         assert!(written.map(|kept| kept.file(run.path())).is_sorted());
     }

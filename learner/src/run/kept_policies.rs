@@ -13,6 +13,7 @@ use super::progress::ROW_EVERY;
 use crate::error::Error;
 use crate::run::folder::Folder;
 use offtrack_evaluation::files;
+use offtrack_evaluation::run_file::RunFile;
 
 /// The policies kept so far.
 #[derive(Debug)]
@@ -31,7 +32,7 @@ impl KeptPolicies {
 
     /// The list's file.
     pub fn file(&self) -> PathBuf {
-        kept::list(&self.run)
+        RunFile::Kept.of(&self.run)
     }
 
     /// Whether it is time for the next one.
