@@ -268,7 +268,7 @@ pub(super) mod tests {
         refused(&ENTRY.replace("policy = \"pursuit\"\n", ""), "policy: missing; `policy` or `actions` is needed");
         refused(&ENTRY.replace("[home]", "actions = \"b\"\n[home]"), "policy: pursuit; leave it out, or `actions`");
         refused(&ENTRY.replace("episodes = 2", "episodes = 0"), "home.episodes: 0; must lie in 1..100000");
-        refused(&(ENTRY.to_owned() + "split = \"all\"\n"), "unknown variant `all`, expected one of `train`");
+        refused(&(ENTRY.to_owned() + "split = \"all\"\n"), "home: unknown variant `all`, expected one of `train`");
         refused(&(ENTRY.to_owned() + "stars = 5\n"), "stars");
         let claim = "[home.claim]\ndigest = \"\"\narrived = 0\nends = { a = \"x\" }\n";
         refused(&(ENTRY.to_owned() + claim), "home.claim.ends.a: x; must be letters");
