@@ -6,6 +6,7 @@
 
 mod dxf; // polylines, lines and arcs on their layers
 mod pairs; // group codes and values
+mod unit; // of lengths
 mod geojson; // polygons and lines by a property
 mod site; // what is drawn, as a road
 mod ways; // their lines, joined
@@ -17,9 +18,9 @@ use std::path::Path;
 
 use glam::DVec2;
 
-pub use dxf::Unit;
 use dxf::folded;
 pub use site::Drawn;
+pub use unit::Unit;
 
 use crate::files::reader::{Error, read_bytes};
 use crate::files::windows_1252;

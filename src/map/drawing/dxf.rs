@@ -2,87 +2,20 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::f64::consts::TAU;
-use std::ops::RangeInclusive;
 use std::path::Path;
 
 use glam::DVec2;
 
 use super::pairs::{Pair, pairs};
+use super::unit::{Unit, reach};
 use super::{Drawing, Entity, Layers, is_same_layer};
 use crate::files::reader::{Error, Reader};
 use crate::geometry::{Curve, Piece, arc_of_height};
 
 /// Points nearer than this are one (m).
 const SAME: f64 = 1e-6;
-/// Least and most that kerbs reach over (m).
-const REACH: RangeInclusive<f64> = 10.0..=20_000.0;
 /// Most entities of a drawing.
 const MOST_ENTITIES: usize = 1_000_000;
-
-/// The unit of a drawing's coordinates.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Unit {
-    /// Metres.
-    Metre,
-    /// Millimetres.
-    Millimetre,
-    /// Centimetres.
-    Centimetre,
-    /// Feet of 0.3048 m.
-    Foot,
-    /// Feet of the United States' surveys, of 1200 / 3937 m.
-    SurveyFoot,
-    /// Inches.
-    Inch,
-}
-
-impl Unit {
-    /// The units by the words of a flag.
-    pub const NAMED: [(&'static str, Unit); 6] = [
-        ("m", Unit::Metre),
-        ("mm", Unit::Millimetre),
-        ("cm", Unit::Centimetre),
-        ("ft", Unit::Foot),
-        ("us-ft", Unit::SurveyFoot),
-        ("in", Unit::Inch),
-    ];
-
-    /// Its word of a flag.
-    pub fn name(self) -> &'static str {
-        Unit::NAMED.iter().find(|(_, unit)| *unit == self).map_or("", |(name, _)| name)
-    }
-
-    /// Those of these units, as an error lists them.
-    pub(super) fn listed(named: &[(&str, Unit)]) -> String {
-        let names: Vec<&str> = named.iter().map(|(name, _)| *name).collect();
-        names.split_last().map_or_else(String::new, |(last, others)| format!("{} or {last}", others.join(", ")))
-    }
-
-    /// The unit's length (m).
-    pub fn metres(self) -> f64 {
-        match self {
-            Unit::Metre => 1.0,
-            Unit::Millimetre => 1e-3,
-            Unit::Centimetre => 1e-2,
-            Unit::Foot => 0.3048,
-            Unit::SurveyFoot => 1200.0 / 3937.0,
-            Unit::Inch => 0.0254,
-        }
-    }
-
-    /// By the value of `$INSUNITS`.
-    fn of_code(code: &str) -> Option<Unit> {
-        match code {
-            "1" => Some(Unit::Inch),
-            "2" => Some(Unit::Foot),
-            "4" => Some(Unit::Millimetre),
-            "5" => Some(Unit::Centimetre),
-            "6" => Some(Unit::Metre),
-            "21" => Some(Unit::SurveyFoot),
-            _ => None,
-        }
-    }
-}
 
 impl Drawing {
     pub(super) fn parse(file: &Path, text: &str, layers: &Layers) -> Result<Drawing, Error> {
@@ -93,10 +26,8 @@ impl Drawing {
         let (blocks, unseen_layers) = (drawn_blocks(&pairs, layers), unseen_layers(&pairs));
         let reader = Reader::of(file);
         reader.count("entities", entities.len(), 0..=MOST_ENTITIES)?;
-        let mut drawing = Drawing { notes: note.into_iter().collect(), ..Drawing::default() };
-        let mut others: BTreeMap<&str, usize> = BTreeMap::new();
-        let mut without_outline: Vec<&str> = Vec::new();
-        let (mut on_paper, mut unseen) = (0, 0);
+        let mut drawing = Drawing::default();
+        let mut left_out = LeftOut::default();
         let mut index = 0;
         while index < entities.len() {
             let entity = entities[index];
@@ -108,7 +39,7 @@ impl Drawing {
                 index += n;
             }
             if text_of(entity, 67) == Some("1") {
-                on_paper += 1;
+                left_out.on_paper += 1;
                 continue;
             }
             let layer = text_of(entity, 8).unwrap_or_default();
@@ -128,72 +59,77 @@ impl Drawing {
             } else if is(&layers.aprons) {
                 &mut drawing.aprons
             } else {
-                if !matches!(entity[0].value, "VERTEX" | "SEQEND") {
-                    *others.entry(layer).or_default() += 1;
-                }
+                left_out.elsewhere(layer, entity[0].value);
                 continue;
             };
-            if is_unseen {
-                unseen += usize::from(entity[0].value != "SEQEND");
-                continue;
+            match entity[0].value {
+                "SEQEND" => {}
+                _ if is_unseen => left_out.unseen += 1,
+                kind => match curve(file, entity, vertices, unit.metres())? {
+                    Some(drawn) => target.push(drawn),
+                    None => left_out.without_outline.push(kind),
+                },
             }
-            match curve(file, entity, vertices, unit.metres())? {
-                Some(drawn) => target.push(drawn),
-                None if entity[0].value == "SEQEND" => {}
-                None => without_outline.push(entity[0].value),
-            }
-        }
-        if 0 < unseen {
-            let what = "entities on these layers that are invisible, or whose layer is off or frozen, are left out";
-            drawing.notes.push(format!("{unseen} {what}"));
         }
         for (layer, kind) in [(&layers.kerbs, &drawing.kerbs), (&layers.lanes, &drawing.lanes)] {
             if kind.is_empty() {
-                let own = [(&layers.kerbs, &drawing.kerbs), (&layers.lanes, &drawing.lanes)];
-                let own =
-                    own.into_iter().filter(|(_, kind)| !kind.is_empty()).map(|(layer, kind)| (&**layer, kind.len()));
-                let others = others.iter().map(|(layer, n)| (*layer, *n));
-                let known: Vec<String> = own.chain(others).map(|(layer, n)| format!("{layer} ({n})")).collect();
-                let has = if known.is_empty() { "nothing".into() } else { known.join(", ") };
-                let hidden = if 0 < unseen { ", and what is off, frozen or invisible: show it" } else { "" };
-                return Err(reader.invalid(
-                    format!("layer {layer}"),
-                    "empty",
-                    format!("the drawing has {has}{hidden}"),
-                ));
+                let expected = format!("the drawing has {}", left_out.has(&drawing, layers));
+                return Err(reader.invalid(format!("layer {layer}"), "empty", expected));
             }
         }
         reach(&reader, &drawing.kerbs)?;
-        let n_others: usize = others.values().sum();
-        if 0 < n_others {
-            drawing.notes.push(format!("{n_others} entities on {} other layers are left out", others.len()));
-        }
-        if 0 < on_paper {
-            drawing.notes.push(format!("{on_paper} entities in paper space are left out"));
-        }
-        if !without_outline.is_empty() {
-            let kinds: Vec<&str> = without_outline.iter().copied().collect::<BTreeSet<_>>().into_iter().collect();
-            let n = without_outline.len();
-            let kinds = kinds.join(", ");
-            drawing.notes.push(format!("{n} entities on these layers that are no outlines are left out: {kinds}"));
-        }
+        drawing.notes = note.into_iter().chain(left_out.notes()).collect();
         Ok(drawing)
     }
 }
 
-/// A drawing of a roundabout reaches over tens or hundreds of metres; one whose unit is not what it says does not.
-pub(super) fn reach(reader: &Reader, kerbs: &[Entity]) -> Result<(), Error> {
-    // A circle ends where it begins.
-    let along = |piece: &Piece| [0.0, 0.25, 0.5, 0.75, 1.0].map(|part| piece.point_at(part * piece.length()));
-    let ends = kerbs.iter().flat_map(|kerb| kerb.curve.pieces.iter().flat_map(along));
-    let (low, high) = ends.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
-    let over = (high - low).max_element();
-    if REACH.contains(&over) {
-        return Ok(());
+/// What of a drawing is not taken.
+#[derive(Default)]
+struct LeftOut<'a> {
+    /// How many entities lie on each layer that is not asked for.
+    others: BTreeMap<&'a str, usize>,
+    /// Kinds of the entities that have no outline, on the layers that are asked for.
+    without_outline: Vec<&'a str>,
+    on_paper: usize,
+    /// Invisible, or on a layer that is off or frozen.
+    unseen: usize,
+}
+
+impl<'a> LeftOut<'a> {
+    /// An entity on a layer that is not asked for; what belongs to the one before it is not counted.
+    fn elsewhere(&mut self, layer: &'a str, kind: &str) {
+        if !matches!(kind, "VERTEX" | "SEQEND") {
+            *self.others.entry(layer).or_default() += 1;
+        }
     }
-    let (least, most, units) = (REACH.start(), REACH.end(), Unit::listed(&Unit::NAMED));
-    let expected = format!("must lie in {least}..{most} m; is its unit right? --unit {units} says another");
-    Err(reader.invalid("kerbs", format!("reach over {over:.2} m"), expected))
+
+    /// What the drawing has, for who misses a layer.
+    fn has(&self, drawing: &Drawing, layers: &Layers) -> String {
+        let own = [(&*layers.kerbs, drawing.kerbs.len()), (&*layers.lanes, drawing.lanes.len())];
+        let own = own.into_iter().filter(|(_, n)| 0 < *n);
+        let others = self.others.iter().map(|(layer, n)| (*layer, *n));
+        let known: Vec<String> = own.chain(others).map(|(layer, n)| format!("{layer} ({n})")).collect();
+        let has = if known.is_empty() { "nothing".into() } else { known.join(", ") };
+        let hidden = if 0 < self.unseen { ", and what is off, frozen or invisible: show it" } else { "" };
+        format!("{has}{hidden}")
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        let mut note = |n: usize, what: String| {
+            if 0 < n {
+                notes.push(format!("{n} entities {what}"));
+            }
+        };
+        let unseen = "on these layers that are invisible, or whose layer is off or frozen, are left out";
+        note(self.unseen, unseen.to_owned());
+        note(self.others.values().sum(), format!("on {} other layers are left out", self.others.len()));
+        note(self.on_paper, "in paper space are left out".to_owned());
+        let kinds: Vec<&str> = self.without_outline.iter().copied().collect::<BTreeSet<_>>().into_iter().collect();
+        let without_outline = format!("on these layers that are no outlines are left out: {}", kinds.join(", "));
+        note(self.without_outline.len(), without_outline);
+        notes
+    }
 }
 
 /// The unit that is asked for, else that of the header; and a note where the header says another one.

@@ -9,7 +9,7 @@ use glam::DVec2;
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::dxf::reach;
+use super::unit::reach;
 use super::{Drawing, Entity, Layers, Unit, is_same_layer};
 use crate::files::reader::{Error, Reader, shortened};
 use crate::geometry::area::densified;
