@@ -272,9 +272,10 @@ impl Scenario {
         self.places.iter().enumerate().flat_map(|(index, place)| place.routes.iter().map(move |route| (index, route)))
     }
 
-    /// The action table for a lock (rad): pairs of a steer angle and a target speed or a change of it, the speed
-    /// varying slowest. Where actions are continuous it is what commands of -1 and of 1 ask for.
-    pub fn actions(&self, lock: f32) -> Vec<Action> {
+    /// The action table: pairs of a steer angle and a target speed or a change of it, the speed varying slowest. Where
+    /// actions are continuous it is what commands of -1 and of 1 ask for.
+    pub fn actions(&self) -> Vec<Action> {
+        let lock = self.lock_of_levels() as f32;
         let pair = |speed: f64, level: f64| Action { steering: level as f32 * lock, speed: speed as f32 };
         let speeds = if self.speed_changes.is_empty() { &self.speeds } else { &self.speed_changes };
         if self.action_kind == ActionKind::Continuous {

@@ -102,7 +102,7 @@ impl World {
         scenario.check()?;
         let substep = (scenario.step / f64::from(scenario.n_substeps)) as f32;
         let (rigs, rays) = rigs(scenario, substep);
-        let actions = scenario.actions(scenario.lock_of_levels() as f32);
+        let actions = scenario.actions();
         let mut waypoints = Vec::new();
         let mut previews = Vec::new();
         let mut routes = Vec::new();

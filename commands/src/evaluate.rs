@@ -83,7 +83,7 @@ pub struct Args {
     /// commas. The widest search is repeated with a choice at every step.
     #[arg(long, value_delimiter = ',', default_value = "64,512", requires = "certify")]
     widths: Vec<usize>,
-    /// Search from so long before each contact with another vehicle [s] for actions that avoid it, and report how many
+    /// Search from so long before each contact with another vehicle (s) for actions that avoid it, and report how many
     /// could have been avoided.
     #[arg(
         long,

@@ -172,16 +172,21 @@ fn baker(file: &Path) -> Result<Vec<u8>, Error> {
     Err(Error::Setting { name: "--baker", value: file.display().to_string(), expected })
 }
 
-/// The shipped policies that can drive on a benchmark and have its name or, where there are none, all that can.
+/// The shipped policies that can drive on a benchmark and have its name, alone or before a hyphen, or, where there are
+/// none, all that can.
 fn shipped(grounds: &[Ground]) -> Result<Vec<Policy>, Error> {
     let names = Policy::shipped_names();
     let policies = names.into_iter().map(Policy::shipped).collect::<Result<Vec<Policy>, _>>()?;
     let mut is_chosen = vec![false; names.len()];
     for Ground { scenario, world, .. } in grounds {
         let able: Vec<usize> = (0..names.len()).filter(|&index| policies[index].check(world).is_ok()).collect();
-        let has_own = able.iter().any(|&index| names[index].starts_with(&scenario.name));
+        let is_own = |index: usize| {
+            let rest = names[index].strip_prefix(scenario.name.as_str());
+            rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('-'))
+        };
+        let has_own = able.iter().any(|&index| is_own(index));
         for index in able {
-            is_chosen[index] |= !has_own || names[index].starts_with(&scenario.name);
+            is_chosen[index] |= !has_own || is_own(index);
         }
     }
     Ok(policies.into_iter().zip(is_chosen).filter_map(|(policy, is_chosen)| is_chosen.then_some(policy)).collect())

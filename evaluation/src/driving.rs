@@ -23,7 +23,7 @@ pub struct Driving {
     /// Steps by lateral acceleration of the trailer, and by jerk, in bins.
     pub(super) lateral_accelerations: Vec<u16>,
     pub(super) jerks: Vec<u16>,
-    /// Acceleration and target speed after the last step [m/s^2, m/s].
+    /// Acceleration and target speed after the last step (m/s², m/s).
     acceleration: f32,
     target_speed: f32,
 }

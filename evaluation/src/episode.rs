@@ -198,9 +198,17 @@ pub(super) fn success_over_routes<'a>(episodes: impl Iterator<Item = &'a Episode
 }
 
 /// The 95 % Wilson interval of the fraction `successes / trials` (E. Wilson, "Probable Inference, the Law of
-/// Succession, and Statistical Inference", 1927).
+/// Succession, and Statistical Inference", 1927); without trials all fractions, 0 to 1.
+///
+/// # Panics
+///
+/// If there are more successes than trials.
 pub fn wilson(successes: usize, trials: usize) -> (f64, f64) {
     const Z: f64 = 1.959_964;
+    assert!(successes <= trials, "{successes} successes in {trials} trials");
+    if trials == 0 {
+        return (0.0, 1.0);
+    }
     let (n, p) = (trials as f64, successes as f64 / trials as f64);
     let centre = (p + Z * Z / (2.0 * n)) / (1.0 + Z * Z / n);
     let half = Z / (1.0 + Z * Z / n) * (p * (1.0 - p) / n + Z * Z / (4.0 * n * n)).sqrt();
@@ -271,6 +279,7 @@ pub(super) mod tests {
         assert!((low - 0.6991).abs() < 5e-4 && (high - 0.7650).abs() < 5e-4, "{low} {high}");
         assert_eq!(wilson(0, 10).0, 0.0);
         assert_eq!(wilson(10, 10).1, 1.0);
+        assert_eq!(wilson(0, 0), (0.0, 1.0));
         // Agresti and Coull's example for 0 of 10: 0.2775.
         assert!((wilson(0, 10).1 - 0.2775).abs() < 1e-4);
     }

@@ -116,7 +116,8 @@ impl Backend {
             BLIND_AMONG => self.rollout_of::<BLIND_AMONG>(config, world, routes, mirror),
             MASS_AMONG => self.rollout_of::<MASS_AMONG>(config, world, routes, mirror),
             ORACLE_AMONG => self.rollout_of::<ORACLE_AMONG>(config, world, routes, mirror),
-            _ => self.rollout_of::<N_VALUES>(config, world, routes, mirror),
+            N_VALUES => self.rollout_of::<N_VALUES>(config, world, routes, mirror),
+            n => unreachable!("a benchmark observes {n} values"),
         }
     }
 

@@ -35,8 +35,7 @@ pub fn transitions(config: &Config) -> usize {
 }
 
 /// An error if a run of networks of so many values and actions does not fit into the memory that the machine has free.
-/// It
-/// names the key that takes most.
+/// It names the key that takes most.
 pub fn check(config: &Config, n_values: usize, n_actions: usize) -> Result<(), Error> {
     check_within(config, n_values, n_actions, available_memory().map_or(u128::MAX, u128::from))
 }

@@ -22,7 +22,7 @@ fn first_ray() -> usize {
         .unwrap_or_default()
 }
 
-/// Tolerance of two sensors' mounts or two steer angles that are mirror images [m, rad]: f32 rounds at 1e-6 of a few
+/// Tolerance of two sensors' mounts or two steer angles that are mirror images (m, rad): f32 rounds at 1e-6 of a few
 /// metres.
 const SAME: f32 = 1e-4;
 

@@ -11,7 +11,7 @@ use std::thread::ThreadId;
 
 use crate::error::Error;
 
-/// Folders of the project, below [`root`].
+/// Folders of the project's repository.
 const OWN: [&str; 10] =
     ["src/", "cli/", "commands/", "drawing/", "evaluation/", "learner/", "policy/", "python/", "reference/", "web/"];
 
@@ -103,15 +103,20 @@ fn with_watched<T>(work: impl FnOnce(&mut Watched) -> T) -> T {
 
 /// Whether a source file is one of the project's.
 fn is_own(file: &str) -> bool {
-    let file = file.replace('\\', "/");
-    file.strip_prefix(&root()).is_some_and(|file| OWN.iter().any(|folder| file.starts_with(folder)))
+    is_beside(file, file!())
 }
 
-/// What stands before the project's folders in the names of its source files: nothing where it is built from its
-/// repository.
-fn root() -> String {
-    let this = file!().replace('\\', "/");
-    this.strip_suffix("learner/src/panics.rs").unwrap_or_default().to_owned()
+/// Whether a source file is one of the project's as this one is named `this`: below the repository's folders or, of a
+/// package that stands among others by its name and version, in one of the project's packages.
+fn is_beside(file: &str, this: &str) -> bool {
+    let (file, this) = (file.replace('\\', "/"), this.replace('\\', "/"));
+    if let Some(repository) = this.strip_suffix("learner/src/panics.rs")
+        && !repository.ends_with('-')
+    {
+        return file.strip_prefix(repository).is_some_and(|file| OWN.iter().any(|folder| file.starts_with(folder)));
+    }
+    let packages = this.strip_suffix("/src/panics.rs").and_then(|package| package.rsplit_once('/'));
+    packages.is_some_and(|(folder, _)| file.strip_prefix(folder).is_some_and(|file| file.starts_with("/offtrack-")))
 }
 
 fn message(panic: &(dyn Any + Send)) -> String {
@@ -140,6 +145,19 @@ mod tests {
     }
 
     #[test]
+    fn packages_of_the_project_are_told_from_those_beside_them() {
+        let packages = "/home/user/.cargo/registry/src/index";
+        let this = format!("{packages}/offtrack-learner-0.2.0/src/panics.rs");
+        for own in ["offtrack-0.2.0/src/simulator.rs", "offtrack-learner-0.2.0/src/sac.rs"] {
+            assert!(is_beside(&format!("{packages}/{own}"), &this), "{own}");
+        }
+        for library in ["wgpu-30.0.0/src/lib.rs", "burn-tensor-0.22.0/src/offtrack-/tensor.rs"] {
+            assert!(!is_beside(&format!("{packages}/{library}"), &this), "{library}");
+        }
+        assert!(!is_beside("src/main.rs", &this), "a program that uses the library");
+    }
+
+    #[test]
     fn every_crate_of_the_workspace_is_the_projects() {
         let manifest: toml::Table = include_str!("../../Cargo.toml").parse().unwrap();
         let members = manifest["workspace"]["members"].as_array().unwrap();
@@ -149,7 +167,7 @@ mod tests {
                 "." => String::new(),
                 member => format!("{member}/"),
             };
-            let file = format!("{}{folder}src/lib.rs", root());
+            let file = format!("{}{folder}src/lib.rs", file!().strip_suffix("learner/src/panics.rs").unwrap());
             assert!(is_own(&file), "{file}");
         }
     }

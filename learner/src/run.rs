@@ -129,8 +129,9 @@ impl<'a> Run<'a> {
             }
             self.checkpoint_if_due(outdate)?;
         }
-        // With a budget of time the clock may have ended the loop just before the last one.
-        if self.validate_if_due()? {
+        // With a budget of time the clock may have ended the loop just before the last one. A run that was stopped is due
+        // for none that it would not have had otherwise.
+        if 1.0 <= self.progress.fraction() && self.validate_if_due()? {
             self.keep_if_due(true)?;
             self.write_row()?;
         }

@@ -258,7 +258,12 @@ impl Step {
 
 /// The first figure that is not finite, with its name.
 pub fn not_finite(update: &Update) -> Option<(&'static str, f32)> {
-    let figures = [("critic loss", update.critic_loss), ("actor loss", update.actor_loss), ("entropy", update.entropy)];
+    let figures = [
+        ("critic loss", update.critic_loss),
+        ("actor loss", update.actor_loss),
+        ("entropy", update.entropy),
+        ("value", update.value),
+    ];
     figures.into_iter().find(|(_, value)| !value.is_finite())
 }
 

@@ -121,6 +121,37 @@ fn a_run_that_a_caller_stops_and_continues_equals_one_never_stopped() {
 }
 
 #[test]
+fn a_run_that_is_stopped_before_it_learns_leaves_nothing_that_one_never_stopped_would_not() {
+    let place = tempfile::tempdir().unwrap();
+    let config = small(place.path());
+    let text = std::fs::read_to_string(&config.benchmark).unwrap();
+    let validating = text.replace("test = [\"E-right-1\", ", "validation = [\"E-right-1\"]\ntest = [");
+    std::fs::write(&config.benchmark, validating).unwrap();
+    // A validation is due after the fifth step of all trucks, and the learner begins long after that.
+    let settings = ["validation={times=10000, episodes=1}", "replay_buffer={capacity=200000, warmup=200000}"];
+    let settings: Vec<String> = SMALL.iter().chain(&settings).map(|&setting| setting.to_owned()).collect();
+    let other = Config::read_with(Path::new("default"), &settings).unwrap();
+    let (validation, replay_buffer) = (other.validation, other.replay_buffer);
+    let config = Config { validation, replay_buffer, steps: Some(400_000), ..config };
+    let (stop, folder) = (AtomicBool::new(false), place.path().join("run"));
+    let outcome = std::thread::scope(|scope| {
+        let watcher = |event: Event| {
+            if matches!(event, Event::Begun(_)) {
+                scope.spawn(|| {
+                    std::thread::sleep(std::time::Duration::from_millis(50));
+                    stop.store(true, Ordering::Relaxed);
+                });
+            }
+        };
+        train(&config, &folder, &watcher, &stop).unwrap()
+    });
+    assert!(outcome.interrupted && 40 < outcome.env_steps && outcome.updates == 0, "{outcome:?}");
+    assert!(outcome.validation.is_none(), "{:?}", outcome.validation);
+    assert_eq!(std::fs::read_to_string(folder.join("metrics.csv")).unwrap().lines().count(), 2);
+    assert!(!folder.join("policies").exists());
+}
+
+#[test]
 fn nobody_continues_a_run_that_is_still_evaluating_nor_touches_what_it_writes() {
     let place = tempfile::tempdir().unwrap();
     let folder = place.path().join("runs/mine");

@@ -128,7 +128,7 @@ fn columns<'py>(py: Python<'py>, starts: &[Start], episodes: &[Episode]) -> PyRe
         ("load_transfer_ratio_peak", |episode| episode.load_transfer_ratio_peak),
         ("articulation_peak", |episode| episode.articulation_peak),
         ("off_tracking_peak", |episode| episode.off_tracking_peak),
-        ("on_apron", |episode| episode.on_apron.unwrap_or(0.0)),
+        ("on_apron", |episode| episode.on_apron.unwrap_or(f64::NAN)),
         ("term_waypoints", |episode| episode.terms.waypoints),
         ("term_lane_distance", |episode| episode.terms.lane_distance),
         ("term_clearance", |episode| episode.terms.clearance),
@@ -181,10 +181,13 @@ impl Function<'_, '_> {
     }
 }
 
-/// Wilson's 95 % interval of the fraction `successes / trials`.
+/// Wilson's 95 % interval of the fraction `successes / trials`; (0, 1) without trials.
 #[pyfunction]
-pub fn wilson(successes: usize, trials: usize) -> (f64, f64) {
-    report::wilson(successes, trials)
+pub fn wilson(successes: usize, trials: usize) -> PyResult<(f64, f64)> {
+    if trials < successes {
+        return Err(PyValueError::new_err(format!("successes: {successes}; there are {trials} trials")));
+    }
+    Ok(report::wilson(successes, trials))
 }
 
 /// The 95 % interval over routes of the mean of an episode's `values`, one for each of `routes`; None on one route.
@@ -196,6 +199,11 @@ pub fn interval_over_routes(
 ) -> PyResult<Option<(f64, f64)>> {
     guarded(|| {
         let (routes, values) = (aligned(routes)?, aligned(values)?);
+        if routes.len()? != values.len()? {
+            let message =
+                format!("values: {} of them; routes has {}, and each is of one", values.len()?, routes.len()?);
+            return Err(PyValueError::new_err(message));
+        }
         let episodes = routes.as_array().into_iter().copied().zip(values.as_array().into_iter().copied());
         let cells = Cells::of_routes(episodes);
         Pool::new(0).run(py, || cells.interval())

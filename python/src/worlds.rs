@@ -238,11 +238,9 @@ pub fn policy_table(scenario: &Given, stop: &AtomicBool) -> PyResult<Table> {
     let cache = Cache::of_user();
     let loading = Loading { cache: cache.as_ref(), stop, ..Loading::PLAIN };
     let scenario = scenario.load(&loading)?;
-    let substep = (scenario.step / f64::from(scenario.n_substeps)) as f32;
-    let rig = scenario.vehicle.rig(&scenario.load, substep, scenario.steer_max);
     Ok(Table {
         benchmark: scenario.name.clone(),
-        actions: scenario.actions(rig.steer_max),
+        actions: scenario.actions(),
         is_continuous: scenario.action_kind == ActionKind::Continuous,
         extras: scenario.extras.names(),
         vehicles: scenario.observes_vehicles,

@@ -79,7 +79,9 @@ impl Output {
             temporary.file().sync_all()?;
         }
         let copied = if let Way::Copied { into, .. } = &self.0 { Some(into.try_clone()?) } else { None };
+        let target = if let Way::Replaced { target, .. } = &self.0 { Some(target.clone()) } else { None };
         self.finish_unsynced()?;
+        target.iter().for_each(|target| sync_name(target));
         copied.map_or(Ok(()), |into| into.sync_all())
     }
 
@@ -152,6 +154,15 @@ pub fn keep_access(of: &Metadata, file: &File) -> io::Result<()> {
         }
     }
     file.set_permissions(of.permissions())
+}
+
+/// Waits until the name of a file that was put into its place is on the disk, where the system lets a folder be opened
+/// for that.
+pub fn sync_name(file: &Path) {
+    #[cfg(unix)]
+    let _ = File::open(folder_of(file)).and_then(|folder| folder.sync_all());
+    #[cfg(not(unix))]
+    let _ = file;
 }
 
 /// The folder that a path lies in.

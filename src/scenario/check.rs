@@ -6,6 +6,7 @@
 use std::fmt::Display;
 
 use super::{ActionKind, REWARD_KEYS, Scenario, Traffic};
+use crate::traffic;
 use crate::vehicle::{Model, Suspension, Vehicle};
 
 /// A value with which no truck could be stepped.
@@ -77,6 +78,9 @@ impl Scenario {
         }
         self.disturbances.check()?;
         self.traffic.iter().try_for_each(Traffic::check)?;
+        if self.traffic.is_some() && self.step as f32 != traffic::STEP {
+            return Err(invalid("step", self.step, format!("{} with traffic: so long are its steps", traffic::STEP)));
+        }
         if self.traffic.as_ref().is_some_and(|traffic| 1 < traffic.group) && self.start_along != 0.0 {
             let expected = "0 with traffic.group above 1: trucks that begin on their way would stand in each other";
             return Err(invalid("start_along", self.start_along, expected));
@@ -125,6 +129,10 @@ impl Scenario {
         ];
         let finite = [("start_offset", self.start_offset), ("start_heading", self.start_heading)];
         positive.into_iter().try_for_each(|(key, value)| within(key, value, POSITIVE))?;
+        if self.stray_distance < self.spacing {
+            let expected = format!("at least spacing, {}: a truck begins so far from the next waypoint", self.spacing);
+            return Err(invalid("stray_distance", self.stray_distance, expected));
+        }
         finite.into_iter().try_for_each(|(key, value)| within(key, value, FINITE))?;
         let reward = REWARD_KEYS.iter().zip(self.reward.values());
         reward.into_iter().try_for_each(|(key, value)| within(&format!("reward.{}", key.name), value, key.range))

@@ -187,7 +187,7 @@ impl Scenario {
     }
 
     /// The lock that steer levels are fractions of (rad).
-    pub(crate) fn lock_of_levels(&self) -> f64 {
+    pub(super) fn lock_of_levels(&self) -> f64 {
         self.lock_of_levels.or(self.steer_max).unwrap_or(self.vehicle.tractor.steer_max)
     }
 

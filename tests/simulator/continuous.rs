@@ -242,9 +242,10 @@ fn keys_of_continuous_actions_that_make_no_sense_are_refused_by_key() {
 
 #[test]
 fn the_action_table_of_continuous_actions_is_what_commands_of_minus_1_and_of_1_ask_for() {
-    let scenario = benchmark("laden2026-continuous").0;
+    let (mut scenario, _) = benchmark("laden2026-continuous");
+    scenario.steer_max = Some(0.5);
     let [slow, fast] = [10.0, 30.0].map(|kmh: f64| (kmh / 3.6) as f32);
-    assert_eq!(scenario.actions(0.5), [Action { steering: -0.5, speed: slow }, Action { steering: 0.5, speed: fast }]);
+    assert_eq!(scenario.actions(), [Action { steering: -0.5, speed: slow }, Action { steering: 0.5, speed: fast }]);
     let world = World::bake(&scenario).unwrap();
     assert!(world.is_continuous() && world.actions.len() == 2 && !benchmark("laden2026").1.is_continuous());
 }

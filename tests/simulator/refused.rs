@@ -82,6 +82,11 @@ fn a_scenario_changed_in_memory_is_checked_before_it_is_baked() {
     let coarse = refused(|scenario| (scenario.step, scenario.n_substeps) = (1.0, 1));
     assert_eq!(coarse, "n_substeps: 1; must lie in 2..1000");
     assert_eq!(refused(|scenario| scenario.n_substeps = 101), "n_substeps: 101; must lie in 1..100");
+    let traffic = Scenario::named("traffic2026").unwrap().traffic;
+    let slow = refused(|scenario| (scenario.step, scenario.traffic) = (0.2, traffic));
+    assert_eq!(slow, "step: 0.2; 0.1 with traffic: so long are its steps");
+    let near = refused(|scenario| scenario.stray_distance = 0.5);
+    assert!(near.starts_with("stray_distance: 0.5; at least spacing, "), "{near}");
     assert!(refused(|scenario| scenario.cell = 1e-9).starts_with("cell: 0.000000001; "));
     let rigid = refused(|scenario| scenario.vehicle.tractor.suspension.roll_gain = 0.0);
     assert!(rigid.starts_with("vehicle.tractor.suspension.roll_gain: 0; must lie in 0.000001.."), "{rigid}");

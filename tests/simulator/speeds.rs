@@ -181,9 +181,9 @@ fn the_steps_of_a_standing_truck_run_out() {
 #[test]
 fn the_action_table_has_steer_levels_times_speeds_or_changes() {
     let (mut scenario, _) = benchmark("attard2023");
-    scenario.speeds = Vec::from([3.0, 5.0]);
-    assert_eq!(scenario.actions(1.0)[9], Action { steering: -0.8, speed: 5.0 });
+    (scenario.steer_max, scenario.speeds) = (Some(1.0), Vec::from([3.0, 5.0]));
+    assert_eq!(scenario.actions()[9], Action { steering: -0.8, speed: 5.0 });
     scenario.speed_changes = Vec::from([-1.0, 0.0, 1.0]);
-    let actions = scenario.actions(1.0);
+    let actions = scenario.actions();
     assert_eq!((actions.len(), actions[26]), (27, Action { steering: 0.8, speed: 1.0 }));
 }

@@ -94,7 +94,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
         commit: provenance::commit(),
         date: humantime::format_rfc3339_seconds(SystemTime::now()).to_string(),
         values: N_VALUES,
-        actions: Scenario::named(BENCHMARK)?.actions(1.0).len(),
+        actions: Scenario::named(BENCHMARK)?.actions().len(),
         runs: Vec::new(),
     };
     files::print(&format!(

@@ -50,8 +50,10 @@ pub fn run(args: &Args) -> Result<(), Error> {
             training.begin(|config| Folder::create(&runs(args), args.name.as_deref(), &file, config), caller)
         }
     };
-    display.close()?;
-    trained.map(drop)
+    // What ended the run comes before a display that cannot be closed.
+    let closed = display.close();
+    trained?;
+    Ok(closed?)
 }
 
 /// The folder of runs.

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use offtrack::files::writer::{followed, keep_access};
+use offtrack::files::writer::{followed, keep_access, sync_name};
 
 use crate::checkpoint::Columns;
 use crate::error::Error;
@@ -112,6 +112,7 @@ impl Checkpointer {
                 .and_then(|file| file.sync_all())
                 .and_then(|()| File::open(metrics)?.sync_all())
                 .and_then(|()| std::fs::rename(&part, followed(&whole)));
+            sync_name(&whole);
             if moved.is_err() {
                 // A part of a checkpoint would fill the disk for nothing.
                 let _ = std::fs::remove_file(&part);

@@ -6,14 +6,9 @@
 
 use bytemuck::bytes_of;
 use offtrack::files::reader::shown;
-use offtrack::layout::{Action, Rig};
+use offtrack::layout::Rig;
 use offtrack::map::Gutter;
 use offtrack::scenario::Scenario;
-
-/// The action table of a benchmark.
-fn actions(scenario: &Scenario) -> Vec<Action> {
-    scenario.actions(scenario.steer_max.unwrap_or(scenario.vehicle.tractor.steer_max) as f32)
-}
 
 /// What of `other` is not as in `trained`: a key, or words, with both values where they are short. None where a policy
 /// that was trained in the one drives and observes the same in the other.
@@ -33,7 +28,7 @@ pub(super) fn difference(trained: &Scenario, other: &Scenario) -> Option<String>
 
 /// The part of [`difference`] without which a policy cannot drive at all.
 pub(super) fn needed(trained: &Scenario, other: &Scenario) -> Option<String> {
-    if other.action_kind != trained.action_kind || actions(other) != actions(trained) {
+    if other.action_kind != trained.action_kind || other.actions() != trained.actions() {
         return Some("actions and vehicle lock".to_owned());
     }
     if other.observes_vehicles != trained.observes_vehicles {

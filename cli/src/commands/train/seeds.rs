@@ -22,8 +22,10 @@ pub(super) fn run(args: &Args, file: &Path, text: &str) -> Result<(), Error> {
     let training = read(args, file, seeds.len(), &display, caller)?;
     stop_on_signals(&display);
     let trained = training.run_seeds(&seeds, &runs(args), args.name.as_deref(), file, caller);
-    display.close()?;
+    // What ended the runs comes before a display that cannot be closed.
+    let closed = display.close();
     let SeedsOutcome { folder, n_finished, seeds: compared } = trained?;
+    closed?;
     let table = if n_finished == 0 { String::new() } else { compared.table() + "\n" };
     let (path, all) = (shown_path(&folder), seeds.len());
     Ok(files::print(&match n_finished == all {
