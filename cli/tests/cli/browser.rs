@@ -247,7 +247,7 @@ fn a_page_of_a_fleet_shows_each_episode_with_its_own_truck_and_names_vehicle_and
 }
 
 #[test]
-fn a_page_is_as_wide_as_its_window_on_a_telephone_and_on_a_desk() {
+fn a_page_is_as_wide_as_its_window_on_a_telephone_a_tablet_and_a_desk() {
     let place = Place::new();
     let road = "a-roundabout-with-a-rather-long-name";
     let scenarios = repository().join("scenarios");
@@ -262,7 +262,7 @@ fn a_page_is_as_wide_as_its_window_on_a_telephone_and_on_a_desk() {
     succeed(&offtrack(&[&["evaluate", "--benchmark", "laden2026"], &fleet[..]].concat()));
     for page in ["runs/run/report.html", "fleet.html"] {
         let page = place.file(page);
-        for window in [400, 1200] {
+        for window in [400, 780, 1200] {
             let (width, contents) = widths(&page, window);
             // A bar to scroll with takes a few pixels of the window.
             assert!(
