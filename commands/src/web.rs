@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use offtrack::files::reader::{read_bytes, shown_path};
 use offtrack::files::shipped::{Kind, Source};
-use offtrack::scenario::Split;
+use offtrack::scenario::{Scenario, Split};
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 use offtrack_evaluation::kept::{self, Kept};
-use offtrack_evaluation::live::bake::STAMP;
+use offtrack_evaluation::live::bake::{STAMP, vehicle_beyond};
 use offtrack_evaluation::live::{self, Ground, Live, Part, TrainingRun};
 use offtrack_evaluation::policies::{self, rule};
 use offtrack_evaluation::run_file::RunFile;
@@ -20,6 +20,8 @@ use crate::{outputs, roads};
 const BENCHMARKS: [&str; 2] = ["attard2023", "laden2026"];
 /// Most bytes of what bakes roads in a page: ten times what it takes.
 const MOST_BAKER: u64 = 32 << 20;
+/// Most bytes of a table: what a device of WebGPU binds at its default limits.
+const MOST_TABLE: usize = 128 << 20;
 /// The word that stands for every split.
 const ALL: &str = "all";
 
@@ -80,14 +82,27 @@ pub fn run(args: &Args) -> Result<(), Error> {
         let (value, expected) = (benchmarks.join(", "), "a world file holds one benchmark: name one".to_owned());
         return Err(Error::Setting { name: "--benchmark", value, expected });
     }
+    once("--benchmark", &args.benchmark)?;
+    once("--policy", &args.policy)?;
+    // All that is named is read before the roads are baked.
     let baker = args.baker.as_deref().map(baker).transpose()?;
-    let grounds = benchmarks.iter().map(|name| ground(name, args)).collect::<Result<Vec<Ground>, Error>>()?;
+    let named = args.policy.iter().map(|name| named(name)).collect::<Result<Vec<Policy>, Error>>()?;
+    let scenarios = benchmarks.iter().map(|name| scenario(name, args)).collect::<Result<Vec<Scenario>, Error>>()?;
+    let sources = benchmarks.iter().map(|name| Ok(Source::find(Kind::Benchmark, name)?));
+    let sources = sources.collect::<Result<Vec<Source>, Error>>()?;
+    let baker = baker.filter(|_| can_bake(&sources));
+    let each = benchmarks.iter().zip(scenarios).zip(&sources);
+    let grounds = each.map(|((name, scenario), source)| ground(name, scenario, source, args));
+    let grounds = grounds.collect::<Result<Vec<Ground>, Error>>()?;
     if let (true, [ground]) = (args.world, grounds.as_slice()) {
         return printed(&ground.write(&args.output)?);
     }
+    for (policy, name) in named.iter().zip(&args.policy) {
+        check(policy, name, "--policy", &grounds)?;
+    }
     let policies = match (args.policy.as_slice(), &run) {
         ([], None) => shipped(&grounds)?,
-        (names, _) => named(names, &grounds)?,
+        _ => named,
     };
     for (_, policy) in run.iter().flat_map(TrainingRun::policies) {
         check(policy, &policy.name, "--run", &grounds).map_err(|error| match args.benchmark.as_slice() {
@@ -136,8 +151,26 @@ fn printed(parts: &[Part]) -> Result<(), Error> {
     files::print(&parts.iter().map(line).collect::<String>())
 }
 
-/// A benchmark with the routes asked for, baked.
-fn ground(name: &str, args: &Args) -> Result<Ground, Error> {
+/// An error if a flag has a value twice: the page would list it twice.
+fn once(flag: &'static str, values: &[String]) -> Result<(), Error> {
+    let twice = values.iter().enumerate().find(|(index, value)| values[..*index].contains(value));
+    twice.map_or(Ok(()), |(_, value)| {
+        Err(Error::Setting { name: flag, value: value.clone(), expected: "is given twice: once is enough".to_owned() })
+    })
+}
+
+/// Whether a page can bake roads for all of these benchmarks; a note says why not.
+fn can_bake(sources: &[Source]) -> bool {
+    let beyond = sources.iter().find_map(|source| Some((source, vehicle_beyond(source)?)));
+    if let Some((source, vehicle)) = &beyond {
+        let words = "a page cannot read that file: it is written without --baker";
+        files::say(&format!("note: {source}: has the vehicle {vehicle}, and {words}"));
+    }
+    beyond.is_none()
+}
+
+/// A benchmark with the routes asked for, as pages have it.
+fn scenario(name: &str, args: &Args) -> Result<Scenario, Error> {
     let mut scenario = roads::benchmark(name)?;
     let split = Split::named(&args.split);
     if !args.road.is_empty() {
@@ -147,17 +180,35 @@ fn ground(name: &str, args: &Args) -> Result<Ground, Error> {
     if let Some(split) = split {
         roads::keep(&mut scenario, split, name)?;
     }
-    let scenario = live::shown(scenario);
-    let world = roads::world(&scenario)?;
-    if world.is_continuous() {
+    if scenario.steer_levels.is_empty() {
         let expected = "a page steers by levels: the same benchmark with actions.steer_levels is needed".to_owned();
         return Err(Error::Setting { name: "actions.kind", value: "continuous".to_owned(), expected });
     }
-    let text = match Source::find(Kind::Benchmark, name)? {
+    Ok(live::shown(scenario))
+}
+
+/// A benchmark baked, which a command was given as `name`.
+fn ground(name: &str, scenario: Scenario, source: &Source, args: &Args) -> Result<Ground, Error> {
+    let world = roads::world(&scenario)?;
+    let text = match source {
         Source::Embedded(_) => None,
         source => Some(source.text()?),
     };
-    Ok(Ground { scenario, world, text })
+    let is_whole = text.is_none() && args.road.is_empty() && args.split == ALL;
+    let ground = Ground { scenario, world, text, is_whole };
+    fits(&ground, name, MOST_TABLE).map(|()| ground)
+}
+
+/// An error if a table of a benchmark, which a command was given as `name`, has more than `most` bytes.
+fn fits(ground: &Ground, name: &str, most: usize) -> Result<(), Error> {
+    ground.table_above(most).map_or(Ok(()), |(table, n_bytes)| {
+        let expected = format!(
+            "its table {table} has {n_bytes} bytes, and a browser's device takes {most}: ask for fewer of its {} roads \
+             by --road or --split",
+            ground.scenario.places.len()
+        );
+        Err(Error::Setting { name: "--benchmark", value: name.to_owned(), expected })
+    })
 }
 
 /// What bakes roads in the page: the bytes of `file`.
@@ -192,18 +243,14 @@ fn shipped(grounds: &[Ground]) -> Result<Vec<Policy>, Error> {
     Ok(policies.into_iter().zip(is_chosen).filter_map(|(policy, is_chosen)| is_chosen.then_some(policy)).collect())
 }
 
-/// The policies that the flags name.
-fn named(names: &[String], grounds: &[Ground]) -> Result<Vec<Policy>, Error> {
-    let named = |name: &String| {
-        if rule::under(name).is_some() || [rule::YIELDS, rule::FOLLOWS].contains(&name.as_str()) {
-            let expected = "a page has no rule, which decides on the processor: a policy is needed, by its name or its \
-                            file; offtrack evaluate --html shows episodes by a rule";
-            return Err(Error::Setting { name: "--policy", value: name.clone(), expected: expected.to_owned() });
-        }
-        let policy = policies::learned(name)?;
-        check(&policy, name, "--policy", grounds).map(|()| policy)
-    };
-    names.iter().map(named).collect()
+/// A policy that a flag names.
+fn named(name: &str) -> Result<Policy, Error> {
+    if rule::under(name).is_some() || [rule::YIELDS, rule::FOLLOWS].contains(&name) {
+        let expected = "a page has no rule, which decides on the processor: a policy is needed, by its name or its \
+                        file; offtrack evaluate --html shows episodes by a rule";
+        return Err(Error::Setting { name: "--policy", value: name.to_owned(), expected: expected.to_owned() });
+    }
+    policies::learned(name)
 }
 
 /// An error unless a policy, which `flag` has named by `value`, can drive somewhere on the page.
@@ -218,5 +265,25 @@ fn check(policy: &Policy, value: &str, flag: &'static str, grounds: &[Ground]) -
     match checks.next() {
         Some(Err(error)) if checks.all(|check| check.is_err()) => Err(error.into()),
         _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use offtrack::map::Road;
+    use offtrack::world::World;
+
+    use super::*;
+
+    #[test]
+    fn a_benchmark_with_a_table_that_a_browsers_device_does_not_take_is_refused_with_what_would_do() {
+        let scenario = Scenario::named("attard2023").unwrap().on(Road::named("16m").unwrap()).unwrap();
+        let world = World::bake(&scenario).unwrap().into();
+        let ground = Ground { scenario, world, text: None, is_whole: false };
+        let n_bytes = ground.world.all_fields().map(|field| field.values.len() * size_of::<u32>()).sum::<usize>();
+        fits(&ground, "mine.toml", n_bytes).unwrap();
+        let said = fits(&ground, "mine.toml", n_bytes - 1).unwrap_err().to_string();
+        let expected = format!("--benchmark: mine.toml; its table corners has {n_bytes} bytes");
+        assert!(said.starts_with(&expected) && said.contains("--road or --split"), "{said}");
     }
 }

@@ -13,6 +13,8 @@ mod worlds;
 use std::path::Path;
 use std::sync::Arc;
 
+use offtrack::engine::tables::Tables;
+use offtrack::layout::buffers::Table;
 use offtrack::scenario::{Scenario, Split};
 use offtrack::world::World;
 use offtrack_policy::Policy;
@@ -77,6 +79,8 @@ pub struct Ground {
     pub world: Arc<World>,
     /// The text of the benchmark's file; `None` of one that comes with the program.
     pub text: Option<String>,
+    /// Whether it is the program's benchmark with all of its roads and routes, to which reported results belong.
+    pub is_whole: bool,
 }
 
 /// A benchmark as pages have it: with [`N_VEHICLES`] at most, and each truck alone on its road.
@@ -208,6 +212,13 @@ impl Ground {
         files::write_whole(file, [facts.as_bytes(), tables.as_bytes()].concat().as_slice())?;
         parts.extend([("facts", facts.len()), ("in all", facts.len() + tables.len())]);
         Ok(parts)
+    }
+
+    /// The first table with more than `most` bytes, by its name, and its bytes.
+    pub fn table_above(&self, most: usize) -> Option<(&'static str, usize)> {
+        let tables = Tables::new(&self.world);
+        let sized = Table::ALL.iter().filter_map(|table| Some((table.name(), tables.bytes(*table)?.len())));
+        sized.into_iter().find(|(_, n_bytes)| most < *n_bytes)
     }
 
     /// The facts of a file with this benchmark alone, and its sections.

@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use crate::page::{block, read};
-use crate::place::{Place, offtrack, refusal, succeed};
+use crate::place::{Place, offtrack, refusal, repository, succeed};
 
 /// Most bytes of the page that comes without any flag.
 const MOST: usize = 3_200_000;
@@ -39,6 +39,12 @@ fn the_default_page_is_one_small_file_without_an_address_and_its_parts_are_said(
     assert_eq!(names(&facts["policies"]), policies);
     let able: Vec<&Value> = facts["worlds"].as_array().unwrap().iter().map(|world| &world["policies"]).collect();
     assert_eq!(able, [&serde_json::json!([0, 1]), &serde_json::json!([2])]);
+    assert_eq!(whole(&facts), [true, true]);
+}
+
+/// Whether each benchmark is one to which reported results belong.
+fn whole(facts: &Value) -> Vec<bool> {
+    facts["worlds"].as_array().unwrap().iter().map(|world| world["is_whole"].as_bool().unwrap()).collect()
 }
 
 #[test]
@@ -55,6 +61,7 @@ fn a_page_has_the_roads_and_routes_that_are_asked_for_and_random_ones_by_name() 
     assert_eq!(names(&world["routes"])[0], "20m/N-left-4");
     assert!(names(&world["routes"])[1..].iter().all(|name| name.starts_with("wide/7/12/")), "{world}");
     assert_eq!((&all["seed"], names(&all["policies"])), (&Value::from(9), vec!["attard2023 (shipped)"]));
+    assert_eq!(whole(&all), [false]);
     let test = web(&["--split", "test"]);
     assert_eq!(names(&test["worlds"][0]["roads"]), ["20m", "40m"]);
     assert_eq!(test["worlds"][0]["splits"].as_object().unwrap().keys().collect::<Vec<_>>(), ["test"]);
@@ -157,6 +164,20 @@ fn a_baker_of_this_version_goes_into_the_page_which_else_allows_no_webassembly()
     let page = read(&place.file("trucks.html"));
     assert!(page.contains("script-src 'unsafe-inline'\"") && block(&page, "worker").is_empty());
     assert_eq!(facts(&page)["baker"], Value::Null);
+    // A benchmark of one's own, with a vehicle of its own and the name of another.
+    let (own, truck) = (place.file("attard2023.toml"), repository().join("scenarios/vehicles/daf_xf.toml"));
+    let text = read(&place.file("short.toml")).replace(truck.to_str().unwrap(), "truck.toml");
+    std::fs::copy(truck, place.file("truck.toml")).unwrap();
+    std::fs::write(&own, text).unwrap();
+    let output = offtrack(&["web", "--benchmark", own.to_str().unwrap(), "--baker", &baker, "-o", &file]);
+    succeed(&output);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        ["note: ", "attard2023.toml", "vehicle truck.toml", "--baker"].iter().all(|word| said.contains(word)),
+        "{said}"
+    );
+    let all = facts(&read(&place.file("trucks.html")));
+    assert_eq!((&all["baker"], whole(&all)), (&Value::Null, vec![false]));
 }
 
 #[test]
@@ -176,6 +197,9 @@ fn what_no_page_can_show_is_refused() {
     for rule in ["yields:traffic2026", "follows:mine.safetensors", "yields"] {
         refused(&["--benchmark", "traffic2026", "--policy", rule], &["--policy", rule, "on the processor", "--html"]);
     }
+    refused(&[&one[..], &one[..]].concat(), &["--benchmark: attard2023; is given twice"]);
+    let policy = ["--policy", "attard2023"];
+    refused(&[&one[..], &policy, &policy].concat(), &["--policy: attard2023; is given twice"]);
     refused(&["--world"], &["--benchmark", "attard2023, laden2026", "name one"]);
     refused(&[&one[..], &["--world", "--seed", "1"]].concat(), &["--world", "--seed"]);
     refused(&[&one[..], &["--world", "--run", "runs/mine"]].concat(), &["--world", "--run"]);

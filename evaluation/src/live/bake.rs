@@ -161,7 +161,26 @@ fn baked(scenario: Scenario, text: Option<String>) -> Result<Ground, Error> {
     if world.is_continuous() {
         return Err(wrong(name, "has continuous actions, and a page steers by actions.steer_levels".to_owned()));
     }
-    Ok(Ground { scenario, world: world.into(), text })
+    Ok(Ground { scenario, world: world.into(), text, is_whole: false })
+}
+
+/// The first vehicle of a benchmark whose file is not one that comes with the program: a page, which has a benchmark's
+/// text alone, bakes no roads for it. `None` of a text that is no benchmark.
+pub fn vehicle_beyond(benchmark: &Source) -> Option<String> {
+    let table = benchmark.text().ok()?.parse::<toml::Table>().ok()?;
+    let files: Vec<&str> = match table.get("vehicle")? {
+        toml::Value::Array(all) => all.iter().filter_map(|one| one.get("file")?.as_str()).collect(),
+        one => one.as_str().into_iter().collect(),
+    };
+    let alone = Source::Text { name: String::new(), text: String::new(), folder: None };
+    let is_beyond = |file: &&str| {
+        let path = Path::new(file);
+        let is_path = is_map(path) || path.extension().is_some_and(|extension| extension == "toml");
+        let [here, there] = [benchmark.relative(path), alone.relative(path)];
+        let is_same = || matches!((here.text(), there.text()), (Ok(here), Ok(there)) if here == there);
+        is_path && !(matches!(there, Source::Embedded(_)) && is_same())
+    };
+    files.into_iter().find(is_beyond).map(str::to_owned)
 }
 
 fn wrong(file: &str, message: String) -> Error {

@@ -14,8 +14,8 @@ const metWords = ({ met, contact }) => (met === 0 ? "" : `${contact & 1 ? "tract
 
 /** The evaluation of a policy on a benchmark that is reported, of the split that is driven if there is one. */
 function reportedOf(policy, world, split) {
-  // The roads of a dropped file are others than the benchmark's.
-  if (world.facts.file || world.facts.on) return undefined;
+  // The roads of others are not those of the evaluation.
+  if (!world.facts.is_whole) return undefined;
   const known = (policy?.reported ?? []).filter(({ benchmark }) => benchmark === world.facts.name);
   return known.find((one) => one.split === split) ?? known.find((one) => one.split === "test") ?? known[0];
 }

@@ -8,8 +8,17 @@ class World {
     );
     this.kept = new Map();
     this.tables = {};
-    for (const name of Object.keys(facts.tables)) {
-      const bytes = this.bytes(name);
+    const all = Object.keys(facts.tables).map((name) => [name, this.bytes(name)]);
+    const most = Math.min(gpu.limits.maxStorageBufferBindingSize, gpu.limits.maxBufferSize);
+    const large = all.find(([, bytes]) => most < bytes.length);
+    if (large !== undefined) {
+      const [table, size] = [large[0], large[1].length];
+      throw new Error(
+        `${facts.name} is too large for this browser's device: its table ${table} has ${whole(size)} bytes, ` +
+          `at most ${whole(most)} fit; a benchmark with fewer roads is needed.`,
+      );
+    }
+    for (const [name, bytes] of all) {
       this.tables[name] = gpu.buffer(
         name,
         bytes.length,

@@ -16,7 +16,7 @@ use super::{Ground, journal, splits};
 
 /// The facts, with the tables as sections.
 pub(super) fn printed(ground: &Ground, policies: &[&Policy], packed: &mut Packed) -> Value {
-    let Ground { scenario, world, text } = ground;
+    let Ground { scenario, world, text, is_whole } = ground;
     let routes: Vec<(usize, &Route)> = scenario.routes().collect();
     let roads = scenario.places.iter().zip(&world.fields).enumerate().map(|(index, (place, field))| {
         let extent = [field.columns, field.rows].map(|cells| cells as f32 / field.cells_per_metre);
@@ -36,6 +36,7 @@ pub(super) fn printed(ground: &Ground, policies: &[&Policy], packed: &mut Packed
     json!({
         "name": scenario.name,
         "source": { "name": scenario.name, "text": text },
+        "is_whole": is_whole,
         "step": scenario.step,
         "sensor_range": world.params.sensor_range,
         "n_actions": world.params.n_actions,

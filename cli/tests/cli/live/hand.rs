@@ -25,7 +25,7 @@ fn page(place: &Place, roundabout: &str) -> String {
     fs::write(&file, before + "[[roundabout]]\nfile = \"road.toml\"\ntrain = \"all\"\n").unwrap();
     let scenario = Scenario::read(&file).unwrap();
     let world = Arc::new(World::bake(&scenario).unwrap());
-    written(vec![Ground { scenario, world, text: None }], Vec::new(), &place.file("trucks.html"))
+    written(vec![Ground { scenario, world, text: None, is_whole: false }], Vec::new(), &place.file("trucks.html"))
 }
 
 #[test]

@@ -36,7 +36,7 @@ pub fn done(page: &str, jobs: &[Value], mut files: HashMap<String, Vec<u8>>) -> 
 pub fn ground(benchmark: &str) -> Ground {
     let scenario = shown(Scenario::find(benchmark).unwrap());
     let world = Arc::new(World::bake(&scenario).unwrap());
-    Ground { scenario, world, text: None }
+    Ground { scenario, world, text: None, is_whole: Scenario::named(benchmark).is_ok() }
 }
 
 /// The text of a page of these benchmarks and policies.

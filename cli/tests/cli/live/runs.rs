@@ -166,7 +166,7 @@ fn a_world_with_a_number_that_is_off_by_a_thousandth_drives_otherwise_in_a_brows
     let right = ground("attard2023");
     let mut world = World::clone(&right.world);
     world.rigs[0].slip *= 1.001;
-    let wrong = Ground { scenario: right.scenario.clone(), world: Arc::new(world), text: None };
+    let wrong = Ground { scenario: right.scenario.clone(), world: Arc::new(world), text: None, is_whole: false };
     let policies = vec![Policy::shipped("attard2023").unwrap()];
     let page = written(vec![wrong], policies.clone(), &place.file("page.html"));
     let runs = [None, Some(0)].map(|policy| Run { world: 0, policy, autoreset: Autoreset::SameStep, demand: None });

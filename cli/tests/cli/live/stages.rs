@@ -77,7 +77,10 @@ fn compare(right: &Arc<World>) {
         "kind": "stages", "name": "right", "world": 0, "n": N_ENVS, "seed": SEED, "stages": stages,
     }));
     let scenario = Scenario::named("attard2023-full").unwrap();
-    let grounds = worlds.into_iter().map(|world| Ground { scenario: scenario.clone(), world, text: None }).collect();
+    let grounds = worlds
+        .into_iter()
+        .map(|world| Ground { scenario: scenario.clone(), world, text: None, is_whole: false })
+        .collect();
     let given = done(&page_of(grounds, Vec::new(), &place.file("page.html")), &jobs, files);
     for (index, stage) in STAGES.into_iter().enumerate() {
         let (name, (written, change)) = (stage.name(), written(stage));

@@ -59,7 +59,7 @@ fn vehicles_that_keep_a_gap_an_inch_off_drive_otherwise_in_a_browser() {
     let right = ground(AMONG);
     let mut world = World::clone(&right.world);
     world.traffic.as_mut().unwrap().rules.gap += length(0.0254);
-    let wrong = Ground { scenario: right.scenario.clone(), world: Arc::new(world), text: None };
+    let wrong = Ground { scenario: right.scenario.clone(), world: Arc::new(world), text: None, is_whole: false };
     let page = written(vec![wrong], Vec::new(), &place.file("page.html"));
     let run = run(None, None);
     let given = done(&page, &[run.job()], HashMap::new());
@@ -79,7 +79,7 @@ fn among(keys: &str) -> Ground {
     let mut scenario = Scenario::parse("among", &text, None, &Loading::PLAIN).unwrap();
     scenario.retain(|_, route| route.name.starts_with("20m/N"));
     let world = Arc::new(World::bake(&scenario).unwrap());
-    Ground { scenario, world, text: None }
+    Ground { scenario, world, text: None, is_whole: false }
 }
 
 /// The trucks of the page on the CPU engine.

@@ -59,7 +59,7 @@ fn agrees(benchmark: &str) {
     let world = World::bake(&scenario).unwrap().into();
     let folder = tempfile::tempdir().unwrap();
     let written = folder.path().join("16m.world");
-    Ground { scenario, world, text: None }.write(&written).unwrap();
+    Ground { scenario, world, text: None, is_whole: false }.write(&written).unwrap();
     let text = std::fs::read_to_string(&written).unwrap();
     let mut lines = text.lines().skip(1);
     let facts: Value = serde_json::from_str(lines.next().unwrap()).unwrap();
@@ -149,4 +149,23 @@ fn what_cannot_be_baked_is_refused_in_the_readers_words() {
     refused("smooth.toml", &continuous, &["smooth", "steer_levels"]);
     let wrong = text("attard2023").replace("spacing", "spacings").replace("range = 20.0", "range = -1.0");
     refused("mine.toml", &wrong, &["mine.toml: sensors.range: "]);
+}
+
+#[test]
+fn a_vehicle_of_a_file_that_does_not_come_with_the_program_is_beyond_a_page() {
+    assert_eq!(vehicle_beyond(&Source::named(Kind::Benchmark, "laden2026").unwrap()), None);
+    let folder = tempfile::tempdir().unwrap();
+    let (text, truck) = (Scenario::text_of("attard2023").unwrap(), file("scenarios/vehicles/daf_xf.toml"));
+    let beyond = |vehicle: &str| {
+        let file = folder.path().join("mine.toml");
+        std::fs::write(&file, text.replace("vehicles/daf_xf.toml", vehicle)).unwrap();
+        vehicle_beyond(&Source::Disk(file))
+    };
+    std::fs::create_dir(folder.path().join("vehicles")).unwrap();
+    std::fs::write(folder.path().join("vehicles/daf_xf.toml"), &truck).unwrap();
+    assert_eq!(beyond("daf_xf"), None);
+    assert_eq!(beyond("vehicles/daf_xf.toml"), None, "the page has the same");
+    assert_eq!(beyond("truck.toml"), Some("truck.toml".to_owned()));
+    std::fs::write(folder.path().join("vehicles/daf_xf.toml"), [&truck[..], b"\n# longer\n"].concat()).unwrap();
+    assert_eq!(beyond("vehicles/daf_xf.toml"), Some("vehicles/daf_xf.toml".to_owned()));
 }
