@@ -196,8 +196,9 @@ impl Live {
     }
 }
 
-/// First line of a world file, before the line of facts and those of sections. The number is that of its form.
-const WORLD_FILE: &str = "offtrack-world 1";
+/// First words of a world file. The number is that of its form: behind it the checksum of the line of facts, which
+/// comes next; then the lines of sections, whose gzip has its own.
+const WORLD_FILE: &str = "offtrack-world 2";
 
 impl Ground {
     /// Writes the benchmark to `file`, to be dropped on a page, and says what its parts weigh.
@@ -207,7 +208,8 @@ impl Ground {
     /// A file that cannot be written.
     pub fn write(&self, file: &Path) -> Result<Vec<Part>, Error> {
         let (facts, packed) = self.printed();
-        let facts = format!("{WORLD_FILE}\n{facts}\n");
+        let facts = facts.to_string();
+        let facts = format!("{WORLD_FILE} {}\n{facts}\n", crc32fast::hash(facts.as_bytes()));
         let (tables, mut parts) = packed.written().map_err(Error::write(file))?;
         files::write_whole(file, [facts.as_bytes(), tables.as_bytes()].concat().as_slice())?;
         parts.extend([("facts", facts.len()), ("in all", facts.len() + tables.len())]);

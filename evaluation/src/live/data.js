@@ -64,10 +64,13 @@ class Live {
 
   /** Adds the benchmark of a world file, and gives its index. What is wrong with the file is an error in words. */
   async addWorld(name, bytes) {
-    const [head, facts, ...lines] = new TextDecoder().decode(bytes).trim().split("\n");
-    if (head !== this.facts.world_file) throw new Error(`${name} is no world file; offtrack web --world writes one.`);
+    const [head, facts, ...lines] = new TextDecoder().decode(bytes).trim().split("\n"), form = this.facts.world_file;
+    if (!head.startsWith(`${form} `))
+      throw new Error(`${name} is no world file of this page's form, ${form}; offtrack web --world writes one.`);
     let read;
     try {
+      const checksum = checksumOf([new TextEncoder().encode(facts)]);
+      if (head !== `${form} ${checksum}`) throw new Error("its facts are others");
       read = { ...JSON.parse(facts), kinds: await unpacked(lines) };
       const isWhole = ({ kind, at, size }) => at + size <= read.kinds[kind]?.length;
       if (!read.sections.every(isWhole)) throw new Error("a part is missing");

@@ -43,8 +43,11 @@ class Policy {
       throw new Error(
         `has the key “${more}”: a page drives by layers over the values of one step, with an output an action`,
       );
+    const isAction = (row) => Array.isArray(row) && row.length === 2 && row.every(Number.isFinite);
     if (!(1 <= nLayers && nLayers <= act.most_layers) || !(actions?.length > 0))
       throw new Error("is a damaged policy file: it has no layers, far too many, or no actions");
+    if (!actions.every(isAction))
+      throw new Error("is a damaged policy file: its action table has a row that is not a steer angle and a speed");
     const names = ["observation.mean", "observation.factor"];
     for (let index = 0; index < nLayers; index++) names.push(`actor.${index}.weight`, `actor.${index}.bias`);
     const tensors = names.map(tensor);

@@ -130,7 +130,7 @@ fn a_file_that_is_no_policy_for_the_benchmark_is_refused_in_words() {
         [&whole[..at], to.as_bytes(), &whole[at + from.len()..]].concat()
     };
     let stacked = Policy { frames: Frames { n: 2, padding: Padding::Zero }, ..plain.clone() };
-    let cases: [(&str, Vec<u8>, &str); 18] = [
+    let cases: [(&str, Vec<u8>, &str); 19] = [
         ("whole", whole.clone(), "it drives"),
         ("empty", Vec::new(), "is not a policy file, or is damaged: it is too short"),
         ("text", b"policy = \"mine\"\n".to_vec(), "is not a policy file, or is damaged"),
@@ -147,6 +147,8 @@ fn a_file_that_is_no_policy_for_the_benchmark_is_refused_in_words() {
         ),
         ("layers", cut.to_bytes(), "is of another shape"),
         ("version", reworded(r#"\"version\":1"#, r#"\"version\":3"#), "is a policy file of version 3"),
+        // The end of the first row is no more.
+        ("rows", reworded("],[", ",0,"), "is a damaged policy file: its action table has a row that is not a steer"),
         ("type", reworded(r#""F32""#, r#""F16""#), "must hold 32-bit floats"),
         ("header", reworded(r#""shape":[69]"#, r#""shape":{69}"#), "its header is no JSON"),
         ("nameless", reworded(r#"\"actions\""#, r#"\"actionz\""#), "no layers, far too many, or no actions"),

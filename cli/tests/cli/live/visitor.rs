@@ -161,7 +161,10 @@ fn a_file_that_is_dropped_drives_or_the_page_says_in_words_why_not() {
     flipped[last] ^= 1;
     let other = place.file("other.world");
     ground("attard2023").write(&other).unwrap();
-    let dropped: [(&str, Vec<u8>, Option<&str>); 8] = [
+    let world = read(&other);
+    let renamed = world.replacen("\"splits\":{", "\"split_\":{", 1).into_bytes();
+    assert_ne!(renamed, world.as_bytes());
+    let dropped: [(&str, Vec<u8>, Option<&str>); 10] = [
         ("good.safetensors", good.clone(), None),
         ("short.safetensors", good[..good.len() / 2].to_vec(), Some("damaged")),
         ("flipped.safetensors", flipped, Some("checksum")),
@@ -169,7 +172,9 @@ fn a_file_that_is_dropped_drives_or_the_page_says_in_words_why_not() {
         ("laden.safetensors", shipped("laden2026").to_bytes(), Some("other extras")),
         ("slow.safetensors", shipped("attard2023-as-run").to_bytes(), Some("another action table")),
         ("roads.toml", b"[ring]".to_vec(), Some("--world")),
-        ("other.world", std::fs::read(&other).unwrap(), None),
+        ("renamed.world", renamed, Some("is a damaged world file")),
+        ("old.world", world.replacen("world 2", "world 1", 1).into_bytes(), Some("no world file of this page's form")),
+        ("other.world", world.into_bytes(), None),
     ];
     let plan = json!({ "visit": "files", "names": dropped.iter().map(|(name, ..)| *name).collect::<Vec<_>>() });
     let files = dropped.iter().map(|(name, bytes, _)| ((*name).to_owned(), bytes.clone())).collect();
