@@ -63,6 +63,8 @@ const SCRIPTS: &[&str] = &[
     include_str!("live/drop.js"),
     include_str!("live/baker.js"),
     include_str!("live/learned.js"),
+    include_str!("live/address.js"),
+    include_str!("live/scripted.js"),
     include_str!("live/app.js"),
     include_str!("live/main.js"),
 ];

@@ -13,6 +13,7 @@ mod roads;
 mod runs;
 mod served;
 mod stages;
+mod starts;
 #[path = "../../../tests/simulator/parity/states.rs"]
 #[expect(dead_code, reason = "the simulator's own tests look at more of the states")]
 mod states;

@@ -8,13 +8,17 @@ const COUNT_EVERY = 500, FRAME_WORK = 20, MOST_WORK = 120;
 const MANY = 4096;
 /** Reach of a click and of a finger (pixels); how long something stays said (ms). */
 const REACH = 14, FINGER_REACH = 26, SAID_FOR = 6000;
+/** A device that is lost says so at most this long after what comes of it (ms). */
+const LOST_WITHIN = 100;
 
-class App {
+class App extends Scripted {
   constructor(live) {
+    super();
     this.live = live;
     this.policies = live.facts.policies.map(({ reported }, index) =>
       Object.assign(Policy.shipped(live, index), { reported }));
-    Object.assign(this, { crowds: [], playing: true, rate: 2, debt: 0, colouring: 0 });
+    Object.assign(this, { crowds: [], playing: true, rate: 2, debt: 0, colouring: 0, pending: {} });
+    live.facts.worlds.forEach((world, index, all) => tellApart(all.slice(0, index), world));
     this.frames = Promise.resolve();
     this.learned = new Learned(this);
     this.baker = new Baker(this);
@@ -22,7 +26,9 @@ class App {
     this.failures = new FailureList((crowd, failure) => this.attempt(() => this.visit.driveAgain(crowd, failure)));
     const { seed } = live.facts;
     const world = Math.max(live.facts.worlds.findIndex((_, index) => this.canDrive(this.learned.last ?? -1, index)), 0);
-    this.chosen = { world, road: "", policy: this.firstPolicy(world), second: null, demand: null, n: MANY, seed };
+    const policy = this.firstPolicy(world);
+    // `atRandom` is whether no policy could drive: the visitor did not ask for random actions.
+    this.chosen = { world, road: "", policy, atRandom: policy === -1, second: null, demand: null, n: MANY, seed };
     this.ready = new Promise((done) => (this.isReady = done));
     listenToChoices(this);
     listenToKeys(this);
@@ -32,41 +38,65 @@ class App {
     new ResizeObserver(() => this.resized()).observe(byId("picture"));
   }
 
-  /** Opens the device and begins. `options` override what is chosen. */
-  async start(options = {}) {
+  /** Opens the device and begins. `options` override what is chosen. What is asked for meanwhile waits. */
+  start(options = {}) {
+    const opened = this.opened(options);
+    this.frames = opened.catch(() => {});
+    return opened;
+  }
+
+  async opened(options) {
+    // Where this fails, the next start has them.
+    this.pending = { ...this.pending, ...options };
     byId("missing").hidden = true;
-    this.say("Compiling the shaders of the simulator for this device.");
-    clearTimeout(this.silence);
+    this.keepSaying("Compiling the shaders of the simulator for this device.");
     // A device that failed goes, with all its memory.
     const failed = this.gpu;
     this.run = this.gpu = null;
     failed?.destroy();
+    this.crowds = [];
+    Object.assign(this.visit, { again: null, focus: null });
+    let gpu;
     try {
-      const gpu = (this.gpu = await openDevice(this.live));
-      const stop = (kind) => (message) => this.gpu === gpu && this.sayMissing(kind, message);
-      gpu.lost.then(stop("lost"));
-      gpu.failed.then(stop("failed"));
-      this.crowds = [];
-      Object.assign(this.visit, { again: null, focus: null });
-      this.picture = new Picture(this.live, this.gpu);
-      this.stage = new Stage(this.gpu, this.picture);
-      if (isSoftware(this.gpu)) this.chosen.n = Math.min(this.chosen.n, FEW);
-      await this.choose(options);
+      gpu = this.gpu = await openDevice(this.live);
+      gpu.lost.then((message) => this.gpu === gpu && this.sayMissing("lost", message));
+      gpu.failed.then((message) => this.fail(gpu, message));
+      this.picture = new Picture(this.live, gpu);
+      this.stage = new Stage(gpu, this.picture);
+      if (isSoftware(gpu)) this.chosen.n = Math.min(this.chosen.n, FEW);
+      await this.take(this.pending);
       if (!byId("missing").hidden) return;
+      this.pending = {};
       byId("said").hidden = true;
       this.isReady(this);
       this.loop();
     } catch (error) {
-      this.sayMissing(error instanceof NoDevice ? error.kind : "failed", error.message);
+      if (error instanceof NoDevice) this.sayMissing(error.kind, error.message);
+      else await this.fail(gpu, error.message);
     }
+  }
+
+  /** Says that a device failed, unless it is lost or another one is open. */
+  async fail(gpu, message) {
+    await Promise.race([gpu.lost, new Promise((next) => setTimeout(next, LOST_WITHIN))]);
+    if (this.gpu === gpu && byId("missing").hidden) this.sayMissing("failed", message);
+  }
+
+  /** An error where no trucks are, and where they stand because the device is gone. */
+  needDevice() {
+    if (0 < this.crowds.length && byId("missing").hidden) return;
+    throw new Error("No trucks can drive here: no graphics device is open.");
   }
 
   /** Says why nothing runs. */
   sayMissing(kind, message) {
     const [title, words] = MISSING[kind];
     this.run = null;
-    // With fewer trucks it may go on.
-    if (kind === "failed") this.chosen.n = Math.max(COUNTS[0], Math.floor(this.chosen.n / 4));
+    if (kind === "failed") {
+      // With fewer trucks it may go on.
+      const { n } = { ...this.chosen, ...this.pending };
+      this.pending.n = Math.min(n, Math.max(COUNTS[0], Math.floor(n / 4)));
+    }
     byId("missing-title").textContent = title;
     byId("missing-words").textContent = kind === "webgpu" ? words : `${words} (${message})`;
     byId("missing").dataset.kind = kind;
@@ -85,9 +115,18 @@ class App {
     return text;
   }
 
-  /** Does something between two frames: no step is under way then. */
+  /** Says something until something else is said. */
+  keepSaying(text) {
+    this.say(text);
+    clearTimeout(this.silence);
+  }
+
+  /** Does something between two frames: no step is under way then. Without a device it is an error. */
   between(act) {
-    const done = this.frames.then(act);
+    const done = this.frames.then(() => {
+      this.needDevice();
+      return act();
+    });
     this.frames = done.catch(() => {});
     return done;
   }
@@ -115,10 +154,19 @@ class App {
 
   /** Takes a choice and begins with it. */
   async choose(change) {
+    this.needDevice();
+    return this.take(change);
+  }
+
+  async take(change) {
     const before = this.chosen, chosen = { ...before, ...change };
+    if (change.policy !== undefined) chosen.atRandom = false;
     if (chosen.world !== before.world) {
       Object.assign(chosen, { road: change.road ?? "", demand: null });
-      if (!this.canDrive(chosen.policy, chosen.world)) chosen.policy = this.firstPolicy(chosen.world);
+      if (chosen.atRandom || !this.canDrive(chosen.policy, chosen.world)) {
+        chosen.policy = this.firstPolicy(chosen.world);
+        chosen.atRandom = chosen.policy === -1;
+      }
       if (chosen.second !== null && !this.canDrive(chosen.second, chosen.world)) chosen.second = null;
     }
     this.chosen = chosen;
@@ -165,7 +213,7 @@ class App {
   /** Forgets the last world, on which trucks do not drive. */
   forgetWorld(index) {
     this.live.facts.worlds.pop();
-    this.gpu.worlds.splice(index);
+    this.gpu?.worlds.splice(index);
     showChoices(this);
   }
 
@@ -177,7 +225,7 @@ class App {
     visit.giveBack();
     await first.driveBy(policies[index]);
     for (const crowd of others) await crowd.driveBy(crowd.policy);
-    this.chosen = { ...this.chosen, policy: index };
+    this.chosen = { ...this.chosen, policy: index, atRandom: false };
     this.forgetWork();
     this.stage.show(crowds);
     visit.open(visit.focus);
@@ -254,7 +302,7 @@ class App {
         await this.between(() => this.frame(count, isDue));
       }
     } catch (error) {
-      if (this.run === run) this.sayMissing("failed", error.message);
+      if (this.run === run) await this.fail(this.gpu, error.message);
     }
   }
 
@@ -337,55 +385,7 @@ class App {
   /** Takes a file that was dropped or chosen; what is said on the page. */
   async dropFile(name, bytes) {
     if (this.baker.takes(name)) return this.baker.file(name, bytes);
+    if (isWorldFile(this.live, bytes)) this.baker.leave();
     return this.attempt(async () => this.say(await takeFile(this, name, bytes)));
-  }
-
-  // What tests of the page ask.
-
-  /** Follows a truck of the first crowd. */
-  pickTruck(env) {
-    return this.between(() => this.visit.pick(env));
-  }
-
-  /** Makes steps of everything that moves, and draws. */
-  stepBy(count) {
-    return this.between(() => this.frame(count, true));
-  }
-
-  takeOver(asked) {
-    this.visit.takeOver(asked);
-  }
-
-  giveBack() {
-    this.visit.giveBack();
-  }
-
-  placeOf(road) {
-    return this.sites.places.find(({ index }) => index === road);
-  }
-
-  /** Shows a point of a road in the middle, the canvas so many metres wide. */
-  lookAt(road, x, y, width) {
-    const { camera } = this.stage, { offset, side } = this.placeOf(road);
-    camera.stay();
-    camera.centre = [offset[0] + x, offset[1] + side * y];
-    camera.pixel = width / camera.size[0];
-    this.draw();
-  }
-
-  /** The pixel of the page's canvas at a point of a road. */
-  screenOf(road, x, y) {
-    this.draw();
-    return this.stage.pixelOf(this.placeOf(road), x, y);
-  }
-
-  /** The colour at a pixel of the page's canvas (0 to 255). */
-  pixelAt(x, y) {
-    return this.stage.colourAt([x, y], this.scene);
-  }
-
-  /** A colour of the theme (0 to 255). */
-  colour(name) {
-    return numbersOf(colours()(name)).map((part) => Math.round(255 * part));
   }
 }

@@ -11,7 +11,7 @@ const MOST_BYTES = 64 << 20;
 class Baker {
   constructor(app) {
     const { live } = app;
-    Object.assign(this, { app, live, section: live.facts.baker });
+    Object.assign(this, { app, live, section: live.facts.baker, stop: null });
     for (const node of document.querySelectorAll(".baked")) node.hidden = !this.isThere;
     byId("no-baker").hidden = this.isThere;
     if (!this.isThere) return;
@@ -25,7 +25,7 @@ class Baker {
     byId("any-road").addEventListener("keydown", ({ key }) => key === "Enter" && drive());
     byId("random").addEventListener("click", () => this.drive(randomName()));
     byId("ring").addEventListener("change", () => {
-      const { name, bytes } = this.map;
+      const { name, bytes } = this.shown;
       this.file(name, bytes, Number(byId("ring").value));
     });
   }
@@ -48,12 +48,6 @@ class Baker {
     return this.take({ roads: text }, text);
   }
 
-  /** Drives on the random road that the part of the address behind # names, if any. */
-  driveByAddress() {
-    const road = new URLSearchParams(location.hash.slice(1)).get("road") ?? "";
-    if (this.isThere && road.includes("/")) this.drive(road);
-  }
-
   /** Drives on what a file describes; of a map on the ring of this index. */
   file(name, bytes, ring = 0) {
     if (bytes.length === 0) return this.app.say(`${name} is empty.`, true);
@@ -64,19 +58,42 @@ class Baker {
   /** Bakes something and drives there. What is asked for later takes its place. What is said on the page. */
   async take(of, name, bytes = new Uint8Array()) {
     const { app, live } = this, begun = performance.now(), { source } = live.facts.worlds[app.chosen.world];
-    this.stop?.();
-    const stopped = new Promise((stop) => (this.stop = () => stop(null)));
+    const asked = { source, name, ring: of.file?.ring, bytes };
+    this.leave();
+    let isLeft = false;
+    const stopped = new Promise((done) => (this.stop = () => done((isLeft = true)))), { stop } = this;
     try {
-      app.say(`Baking ${name}.`);
-      const found = await Promise.race([this.baked({ benchmark: source, of }, bytes, stopped), stopped]);
-      if (found === null) return null;
+      const known = this.known(asked), baked = () => this.baked({ benchmark: source, of }, bytes, stopped);
+      app.keepSaying(`Baking ${name}.`);
+      const found = known === -1 ? await Promise.race([baked(), stopped]) : null;
       const seconds = (performance.now() - begun) / 1000;
-      await app.between(() => this.driveOn(found, of, name, bytes));
+      // What was chosen while this waited for a frame counts.
+      await app.between(() => isLeft || (known === -1 ? this.driveOn(found, asked) : app.choose({ world: known })));
+      if (isLeft) return null;
       const by = app.chosen.policy === -1 ? ", at random" : "";
-      return app.say(`Trucks drive on ${name} now${by}; it was baked here in ${decimal(seconds, 2)}${GAP}s.`);
+      const when = known === -1 ? `; it was baked here in ${decimal(seconds, 2)}${GAP}s` : "";
+      return app.say(`Trucks drive on ${name} now${by}${when}.`);
     } catch (error) {
-      return app.say(error.message, true);
+      return isLeft ? null : app.say(error.message, true);
+    } finally {
+      if (this.stop === stop) this.stop = null;
     }
+  }
+
+  /** Breaks off what is being baked. */
+  leave() {
+    if (this.stop === null) return;
+    this.stop();
+    this.stop = null;
+    byId("said").hidden = true;
+  }
+
+  /** The index of the world that was baked of the same; -1 without one. */
+  known({ source, name, ring, bytes }) {
+    const isSame = (other) => other.length === bytes.length && other.every((byte, index) => byte === bytes[index]);
+    return this.live.facts.worlds.findIndex(({ baked, file }) => baked?.name === name && baked.ring === ring &&
+      // A benchmark of a file is the same whatever drove before.
+      (file || (baked.source.name === source.name && baked.source.text === source.text)) && isSame(baked.bytes));
   }
 
   /** What a worker bakes: facts, and the bytes of each kind of sections. Its error is the reader's. */
@@ -101,10 +118,11 @@ class Baker {
   }
 
   /** Adds what was baked and drives there. */
-  async driveOn({ facts, kinds }, of, name, bytes) {
-    const index = this.live.add(name, { ...facts, kinds }), world = this.live.facts.worlds[index];
-    Object.assign(world, facts.is_benchmark ? { file: name } : { on: name });
-    if (1 < facts.rings.length) Object.assign(world, { rings: facts.rings, ring: of.file.ring, map: { name, bytes } });
+  async driveOn({ facts, kinds }, asked) {
+    const { name, ring } = asked, index = this.live.add(name, { ...facts, kinds }), { worlds } = this.live.facts;
+    const on = 0 < ring ? `${name}, ring ${ring + 1}` : name, baked = { ...asked, rings: facts.rings };
+    Object.assign(worlds[index], facts.is_benchmark ? { file: name } : { on }, { baked });
+    tellApart(worlds.slice(0, index), worlds[index]);
     try {
       await this.app.choose({ world: index });
     } catch (error) {
@@ -116,11 +134,11 @@ class Baker {
 
   /** Shows the rings of a map to choose from, where trucks drive on one. */
   show(world) {
-    const { rings = [], ring, map } = world;
-    this.map = map;
+    const { baked } = world, rings = 1 < baked?.rings.length ? baked.rings : [];
+    this.shown = baked;
     const words = ({ centre, radius }, index) => [index,
       `${index + 1} of ${rings.length}, radius ${decimal(radius, 0)}${GAP}m, at ${centre.map(Math.round).join(", ")}`];
-    fillSelect("ring", rings.map(words), ring);
+    fillSelect("ring", rings.map(words), baked?.ring);
     byId("ring").hidden = byId("ring-label").hidden = rings.length === 0;
   }
 }

@@ -18,8 +18,9 @@ const KEYS = [
   ["C", "colours"], ["R", "sensors"], ["F", "the latest failure again"], ["?", "these keys"],
 ];
 
-/** Most trucks that the device has room for: the widest columns are observations and extras. */
+/** Whether the device, once it is open, has room for so many trucks: the widest columns are observations and extras. */
 const hasRoom = (live, gpu, n) => {
+  if (!gpu) return true;
   const widest = Math.max(...Object.values(live.facts.code.columns).map(({ bytes }) => bytes));
   return n * widest <= Math.min(gpu.limits.maxStorageBufferBindingSize, gpu.limits.maxBufferSize);
 };
@@ -34,7 +35,14 @@ function fillSelect(id, pairs, chosen) {
 }
 
 /** The name of a benchmark, with the file that it came by or the roads that were baked for it. */
-const worldWords = ({ name, file, on }) => (file ? `${name} of ${file}` : on ? `${name} on ${on}` : name);
+const worldWords = ({ name, file, on, copy }) =>
+  `${name}${file ? ` of ${file}` : on ? ` on ${on}` : ""}${copy ? ` (${copy})` : ""}`;
+
+/** Numbers a world where others have its name. */
+function tellApart(others, world) {
+  const n = others.filter((other) => worldWords({ ...other, copy: null }) === worldWords(world)).length;
+  if (0 < n) world.copy = n + 1;
+}
 
 /** Roads to choose from: all, each split that has roads of its own, each road. The value is a split or an index. */
 function roadChoices(world) {
@@ -108,6 +116,7 @@ function listenToChoices(app) {
   const listen = (id, event, act) => byId(id).addEventListener(event, act);
   const on = (id, event, act) => listen(id, event, () => app.attempt(act));
   const value = (id) => byId(id).value;
+  for (const id of ["benchmark", "road"]) listen(id, "change", () => app.baker.leave());
   on("benchmark", "change", () => app.choose({ world: Number(value("benchmark")) }));
   on("road", "change", () => app.choose({ road: value("road") }));
   on("demand", "change", () => app.choose({ demand: value("demand") === "" ? null : Number(value("demand")) }));
@@ -158,10 +167,11 @@ function listenToKeys(app) {
     t: () => app.visit.toggleWheel(), Escape: () => app.visit.escape(), f: () => app.visit.latestFailure(),
   };
   document.addEventListener("keydown", (event) => {
-    const { tagName, type } = event.target;
+    const { tagName, type } = event.target, isSlider = type === "range";
     if (event.ctrlKey || event.metaKey || event.altKey || byId("keys").open) return;
     // Controls with keys of their own keep them.
-    if ((tagName === "INPUT" && type !== "checkbox") || tagName === "SELECT") return;
+    if ((tagName === "INPUT" && type !== "checkbox" && !isSlider) || tagName === "SELECT") return;
+    if (isSlider && /^(Arrow|Home|End|Page)/.test(event.key)) return;
     if (event.key === " " && type === "checkbox") return;
     if ((event.key === " " || event.key === "Enter") && (tagName === "BUTTON" || tagName === "SUMMARY")) return;
     const key = event.key === "=" ? "+" : event.key.length === 1 ? event.key.toLowerCase() : event.key;
@@ -175,23 +185,4 @@ function listenToKeys(app) {
   document.addEventListener("keyup", (event) => app.visit.driving.key(event.key, false));
   // Keys that are released elsewhere would be held for ever.
   window.addEventListener("blur", () => app.visit.driving.held.clear());
-}
-
-/** What the part of the address behind # chooses. */
-function chosenByAddress(facts, first) {
-  const asked = new URLSearchParams(location.hash.slice(1)), chosen = {};
-  const number = (name, most) => {
-    const value = Number(asked.get(name) ?? NaN);
-    if (Number.isInteger(value) && 0 <= value && value <= most) chosen[name] = value;
-  };
-  number("n", COUNTS.at(-1));
-  if (chosen.n === 0) delete chosen.n;
-  number("seed", 2 ** 32 - 1);
-  const world = facts.worlds.findIndex(({ name }) => name === asked.get("benchmark"));
-  if (0 <= world) chosen.world = world;
-  const { roads, splits } = facts.worlds[chosen.world ?? first];
-  const road = roads.findIndex(({ name }) => name === asked.get("road"));
-  if (0 <= road) chosen.road = road;
-  else if (Object.hasOwn(splits, asked.get("road"))) chosen.road = asked.get("road");
-  return chosen;
 }

@@ -19,7 +19,9 @@ async function takeFile(app, name, bytes) {
   if (bytes.length === 0) throw new Error(`${name} is empty.`);
   if (isWorldFile(app.live, bytes)) {
     const index = await app.live.addWorld(name, bytes);
-    app.live.facts.worlds[index].file = name;
+    const { worlds } = app.live.facts;
+    worlds[index].file = name;
+    tellApart(worlds.slice(0, index), worlds[index]);
     try {
       await app.choose({ world: index });
     } catch (error) {

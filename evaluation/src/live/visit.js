@@ -231,15 +231,15 @@ class Visit {
   }
 
   inPane(at) {
-    return this.stage.inPane(at);
+    return this.stage ? this.stage.inPane(at) : { at };
   }
 
   pan(right, down) {
-    this.stage.camera.move(right, down);
+    this.stage?.camera.move(right, down);
   }
 
   zoom(factor, at) {
-    this.stage.camera.zoom(factor, at);
+    this.stage?.camera.zoom(factor, at);
   }
 
   /** A click follows the truck within reach of it (pixels). */

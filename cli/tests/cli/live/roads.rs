@@ -105,8 +105,9 @@ fn random_roads_files_and_maps_are_baked_in_the_page_and_driven_on_and_bad_ones_
     let ring = String::from_utf8(file("roundabouts/16m.toml")).unwrap();
     let wrong = ring.replace("[ring]", "[ring]\nspeed = 3");
     assert!(wrong != ring && beside != benchmark && slow != benchmark);
-    let visits: [Visit; 10] = [
+    let visits: [Visit; 11] = [
         (json!({ "road": "wide/7/12" }), None, &["wide/7/12 now"], "attard2023 on wide/7/12"),
+        (json!({ "road": "wide/7/12" }), None, &["wide/7/12 now."], "attard2023 on wide/7/12"),
         (json!({ "road": "narrow/7/12" }), None, &["distribution: narrow; must be"], "attard2023 on wide/7/12"),
         (json!({ "road": "mixed/3/0, wide/7/13" }), None, &["wide/7/13 now"], "attard2023 on mixed/3/0, wide/7/13"),
         (json!({ "file": "16m.toml" }), Some(ring.into_bytes()), &["16m.toml now"], "attard2023 on 16m.toml"),
@@ -125,7 +126,7 @@ fn random_roads_files_and_maps_are_baked_in_the_page_and_driven_on_and_bad_ones_
             &["zala.xodr now"],
             "attard2023 on zala.xodr",
         ),
-        (json!({ "ring": 1 }), None, &["zala.xodr now"], "attard2023 on zala.xodr"),
+        (json!({ "ring": 1 }), None, &["zala.xodr now"], "attard2023 on zala.xodr, ring 2"),
     ];
     let plan = json!({ "visit": "roads", "visits": visits.iter().map(|(visit, ..)| visit).collect::<Vec<_>>() });
     let files =
@@ -141,10 +142,11 @@ fn random_roads_files_and_maps_are_baked_in_the_page_and_driven_on_and_bad_ones_
         // What cannot be baked leaves those that drive as they are.
         assert!(0 < given["begun"].as_u64().unwrap(), "{given}");
     }
-    let [whole, other] = [&found[8], &found[9]];
+    assert_eq!(found[0]["listed"], found[1]["listed"], "a road is baked and listed once");
+    let [whole, other] = [&found[9], &found[10]];
     assert!(1 < whole["rings"].as_u64().unwrap() && whole["rings"] == other["rings"], "{whole} {other}");
     assert_ne!(whole["bounds"], other["bounds"]);
-    assert_eq!(found[5]["policy"], Value::Null, "a policy drives with actions that are not its own");
+    assert_eq!(found[6]["policy"], Value::Null, "a policy drives with actions that are not its own");
 }
 
 #[test]

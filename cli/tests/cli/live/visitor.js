@@ -164,8 +164,8 @@ async function wheel(live) {
 async function keys(live) {
   const page = await opened(live, { n: 8 }), { visit } = page, all = {};
   await page.stepBy(4);
-  const press = async (key, type = "keydown") => {
-    document.body.dispatchEvent(new KeyboardEvent(type, { key, bubbles: true }));
+  const press = async (key, type = "keydown", target = document.body) => {
+    target.dispatchEvent(new KeyboardEvent(type, { key, bubbles: true }));
     // What a key asks for is done between two frames.
     await page.between(() => {});
   };
@@ -187,6 +187,11 @@ async function keys(live) {
   visit.update(1);
   all.right = visit.driving.steering;
   await press("d", "keyup");
+  // The load's slider has been used.
+  await press("a", "keydown", byId("load"));
+  await press("ArrowRight", "keydown", byId("load"));
+  all.held = [...visit.driving.held];
+  await press("a", "keyup");
   await press("s");
   const before = visit.driving.speed;
   visit.update(0.5);
@@ -307,7 +312,7 @@ async function roads(live, { visits }) {
     await page.stepBy(2);
     const [{ policy, world, batch }] = page.crowds, [chosen] = byId("benchmark").selectedOptions;
     all.push({ ...said(), benchmark: chosen.textContent, policy: policy?.name ?? null, begun: batch.begun,
-      bounds: world.facts.roads[0].bounds, rings: byId("ring").checkVisibility() ? byId("ring").length : 0 });
+      bounds: world.facts.roads[0].bounds, listed: byId("benchmark").length, rings: byId("ring").checkVisibility() ? byId("ring").length : 0 });
   }
   await give("roads", JSON.stringify(all));
   page.gpu.destroy();
@@ -382,6 +387,7 @@ async function without(live, { hasApi }) {
 
 const VISITS = {
   pixels, colouring, among, hand, wheel, keys, touch, files, bytes, roads, unbaked, counts, again, lost, without,
+  starts, address,
 };
 
 try {

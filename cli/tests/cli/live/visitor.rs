@@ -26,7 +26,8 @@ pub fn visited(page: &str, plan: &Value, mut files: HashMap<String, Vec<u8>>, wi
     files.insert("plan".to_owned(), plan.to_string().into_bytes());
     let main = read(&repository().join("evaluation/src/live/main.js"));
     assert!(!main.is_empty() && page.contains(&main), "the page has another last script");
-    let given = given_by(&page.replace(&main, include_str!("visitor.js")), files, without_gpu);
+    let script = concat!(include_str!("starts.js"), include_str!("visitor.js"));
+    let given = given_by(&page.replace(&main, script), files, without_gpu);
     serde_json::from_slice(&given[plan["visit"].as_str().unwrap()]).unwrap()
 }
 
@@ -118,6 +119,7 @@ fn every_key_of_the_page_does_what_its_list_says() {
     assert_eq!((&found["plays"], &found["playsAgain"]), (&json!(true), &json!(false)), "{found}");
     assert_eq!((&found["followed"], &found["driving"]), (&json!(1), &json!(true)), "{found}");
     assert!(0.1 < number("left") && number("right") < number("left") - 0.1, "{found}");
+    assert_eq!(found["held"], json!(["left"]), "a slider keeps arrows alone: {found}");
     assert!(0.5 < number("slower"), "{found}");
     assert_eq!((&found["drivingAfter"], &found["focusAfter"]), (&json!(false), &Value::Null), "{found}");
     assert_eq!((&found["colouring"], &found["help"]), (&json!(1), &json!(true)), "{found}");
