@@ -10,6 +10,7 @@ const MANY = 4096;
 const REACH = 14, FINGER_REACH = 26, SAID_FOR = 6000;
 /** A device that is lost says so at most this long after what comes of it (ms). */
 const LOST_WITHIN = 100;
+const COMPILING = "Compiling the shaders of the simulator for this device.";
 
 class App extends Scripted {
   constructor(live) {
@@ -49,7 +50,7 @@ class App extends Scripted {
     // Where this fails, the next start has them.
     this.pending = { ...this.pending, ...options };
     byId("missing").hidden = true;
-    this.keepSaying("Compiling the shaders of the simulator for this device.");
+    this.keepSaying(COMPILING);
     // A device that failed goes, with all its memory.
     const failed = this.gpu;
     this.run = this.gpu = null;
@@ -67,7 +68,8 @@ class App extends Scripted {
       await this.take(this.pending);
       if (!byId("missing").hidden) return;
       this.pending = {};
-      byId("said").hidden = true;
+      // What is baked meanwhile stays said.
+      if (byId("said").textContent === COMPILING) byId("said").hidden = true;
       this.isReady(this);
       this.loop();
     } catch (error) {
