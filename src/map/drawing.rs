@@ -9,6 +9,7 @@ mod pairs; // group codes and values
 mod unit; // of lengths
 mod geojson; // polygons and lines by a property
 mod site; // what is drawn, as a road
+mod closed; // outlines of kerbs
 mod ways; // their lines, joined
 mod aprons; // their edges among the kerbs
 #[cfg(test)]

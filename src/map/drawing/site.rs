@@ -5,7 +5,7 @@ use std::path::Path;
 
 use glam::DVec2;
 
-use super::{Drawing, Entity, Layers, aprons, ways};
+use super::{Drawing, Entity, Layers, aprons, closed, ways};
 use crate::files::reader::{Error, Reader};
 use crate::geometry::area::densified;
 use crate::geometry::{Curve, Outline, Piece, fitted_circle, fitted_line, wrapped};
@@ -34,8 +34,6 @@ const MOST_APRONS: usize = 200;
 const NEARER: f64 = 1.0;
 /// A way that is drawn backwards leads around the island by so much at least, the other way round than others (rad).
 const BACKWARDS: f64 = 0.3;
-/// Lines that cross do so farther than this from their ends (m).
-const FROM_ENDS: f64 = 0.01;
 /// Farthest that an island may be from a circle, as a fraction of its radius.
 const ROUND: f64 = 0.3;
 
@@ -57,9 +55,10 @@ pub(super) fn drawn(file: &Path, drawing: Drawing, layers: &Layers) -> Result<Dr
     reader.count(&format!("lines on layer {}", layers.aprons), aprons.len(), 0..=MOST_APRONS)?;
     ways::lead_arcs(&mut lanes);
     let lanes = ways::whole(lanes, &layers.lanes, &mut notes);
-    let loops = closed(&reader, kerbs, &layers.kerbs, &mut notes)?;
-    let aprons = closed(&reader, aprons, &layers.aprons, &mut notes)?;
-    let (loops, aprons) = aprons::placed(loops, aprons);
+    let loops = closed::outlines(&reader, kerbs, &layers.kerbs, &mut notes)?;
+    let loops = closed::kerbs(&reader, loops, &lanes, &mut notes)?;
+    let aprons = closed::outlines(&reader, aprons, &layers.aprons, &mut notes)?;
+    let (loops, aprons) = aprons::placed(loops, aprons.into_iter().map(|(_, apron)| apron).collect());
     let (centre, radius) = island(&reader, &loops, layers, layers.ring.or(marked))?;
     if let Some(p) = layers.ring.filter(|p| FARTHEST < p.distance(centre) - radius) {
         let (x, y) = (centre.x, centre.y);
@@ -126,88 +125,6 @@ pub(super) fn drawn(file: &Path, drawing: Drawing, layers: &Layers) -> Result<Dr
         lines,
     };
     Ok(Drawn { ground, notes })
-}
-
-/// The closed outlines: those drawn as such, and chains of open pieces whose ends meet.
-fn closed(reader: &Reader, drawn: Vec<Entity>, layer: &str, notes: &mut Vec<String>) -> Result<Vec<Curve>, Error> {
-    let meets = |a: DVec2, b: DVec2| a.distance(b) <= GAP;
-    let ends = |curve: &Curve| (curve.point_at(0.0), curve.point_at(curve.length()));
-    let (mut loops, mut open) = (Vec::new(), Vec::new());
-    let n = drawn.len();
-    let drawn: Vec<Entity> = drawn.into_iter().filter(|one| GAP < one.curve.length()).collect();
-    if drawn.len() < n {
-        notes.push(format!("{} lines on layer {layer} that are shorter than {GAP} m are left out", n - drawn.len()));
-    }
-    for one in drawn {
-        let (start, end) = ends(&one.curve);
-        if one.is_closed || meets(start, end) { loops.push((one.place, one.curve)) } else { open.push(one) }
-    }
-    let n_open = open.len();
-    while let Some(Entity { mut curve, place, .. }) = open.pop() {
-        loop {
-            let (start, end) = ends(&curve);
-            if meets(start, end) {
-                break;
-            }
-            let next = open.iter().position(|other| {
-                let (from, to) = ends(&other.curve);
-                meets(end, from) || meets(end, to)
-            });
-            let Some(next) = next else {
-                let expected = format!(
-                    "the outline is open at ({:.3}, {:.3}) m: those on layer {layer} must be closed within {GAP} m",
-                    end.x, end.y
-                );
-                return Err(reader.invalid(place, "open", expected));
-            };
-            let other = open.swap_remove(next).curve;
-            let other = if meets(end, ends(&other).0) { other } else { other.reversed() };
-            curve.pieces.extend(other.pieces);
-        }
-        loops.push((place, curve));
-    }
-    if 0 < n_open {
-        notes.push(format!("{n_open} open lines on layer {layer} are joined to closed outlines"));
-    }
-    let mut kept: Vec<Curve> = Vec::new();
-    for (place, curve) in loops {
-        if let Some(at) = crosses_itself(&curve) {
-            let found = format!("crosses itself at ({:.3}, {:.3}) m", at.x, at.y);
-            return Err(reader.invalid(place, found, "one side of an outline is solid: it must not cross itself"));
-        }
-        if kept.iter().any(|other| aprons::coincides(other, &curve)) {
-            notes.push(format!("{place}: an outline on layer {layer} that is there already is left out"));
-        } else {
-            kept.push(curve);
-        }
-    }
-    Ok(kept)
-}
-
-/// Where two lines of an outline cross, if any do (m).
-fn crosses_itself(curve: &Curve) -> Option<DVec2> {
-    // An arc's circle lies around it.
-    let around = |piece: &Piece| match *piece {
-        Piece::Segment { from, to } => (from.min(to), from.max(to)),
-        Piece::Arc { centre, radius, .. } => (centre - radius, centre + radius),
-    };
-    let boxes: Vec<(DVec2, DVec2)> = curve.pieces.iter().map(around).collect();
-    let is_near = |a: usize, b: usize| boxes[a].0.cmple(boxes[b].1).all() && boxes[b].0.cmple(boxes[a].1).all();
-    let is_within = |piece: &Piece, p: DVec2| {
-        [0.0, piece.length()].into_iter().all(|end| FROM_ENDS < piece.point_at(end).distance(p))
-    };
-    let crossing = |(a, b): (usize, usize)| {
-        let (one, other) = (&curve.pieces[a], &curve.pieces[b]);
-        one.meetings(other).into_iter().find(|&p| is_within(one, p) && is_within(other, p))
-    };
-    // From west to east: those that reach as far as the next one begins.
-    let mut order: Vec<usize> = (0..boxes.len()).collect();
-    order.sort_by(|&a, &b| boxes[a].0.x.total_cmp(&boxes[b].0.x));
-    let of_one = |(place, &a): (usize, &usize)| {
-        let beside = order[place + 1..].iter().take_while(|&&b| boxes[b].0.x <= boxes[a].1.x);
-        beside.filter(|&&b| is_near(a, b)).find_map(|&b| crossing((a, b)))
-    };
-    order.iter().enumerate().find_map(of_one)
 }
 
 /// The centre and the radius of the central island.

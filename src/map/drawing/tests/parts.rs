@@ -7,7 +7,8 @@ use glam::DVec2;
 use super::{AT, END, HEADER, drawn, layers, polyline, read};
 use crate::geometry::{Curve, Piece};
 use crate::map::Road;
-use crate::map::drawing::{Layers, parse};
+use crate::map::drawing::{Drawn, Layers, parse};
+use crate::map::ground::Ground;
 
 /// These ways of a road, each as these entities, beside all kerbs.
 fn with_ways(road: &Road, ways: &[&Curve], entities: impl Fn(&Curve) -> String) -> String {
@@ -85,4 +86,35 @@ fn a_point_far_from_every_island_chooses_none() {
         said.contains("ring: (8000, -500); must be within 100 m of the island; the nearest is at (3000.0"),
         "{said}"
     );
+}
+
+#[test]
+fn outlines_in_an_island_are_left_out_and_those_around_beside_or_across_the_road_are_refused_by_their_place() {
+    let road = Road::named("16m").unwrap();
+    let text = drawn(&road, 1.0);
+    let circle = |radius: f64, at: DVec2| Curve::circle(at, radius);
+    let with = |curve: &Curve| read(&(text.clone() + &polyline("KERB", curve, true, 1.0)), &layers());
+    // The back of the central island's kerb.
+    let Drawn { ground, notes } = with(&circle(road.island_radius() - 0.3, DVec2::ZERO)).unwrap();
+    assert_eq!(ground.faces.loops.len(), road.ground().faces.loops.len());
+    assert_eq!(notes.len(), 1);
+    assert!(
+        notes[0].starts_with("line ") && notes[0].ends_with(": an outline inside an island is left out"),
+        "{notes:?}"
+    );
+    for (curve, said) in [
+        (circle(500.0, DVec2::ZERO), "around the road; lies around the outer kerb, line "),
+        (circle(2.0, DVec2::new(400.0, 0.0)), "outside; must lie in the outer kerb, line "),
+        (circle(1.0, DVec2::new(0.0, road.island_radius())), "crosses another outline; must not cross that of line "),
+    ] {
+        let message = with(&curve).unwrap_err();
+        assert!(message.contains(": line ") && message.contains(said), "{message}");
+    }
+    // Without the outer kerb, which is the longest.
+    let Ground { faces, lines, .. } = road.ground();
+    assert!(faces.loops[1..].iter().all(|kerb| kerb.length() < faces.loops[0].length()));
+    let kerbs = faces.loops[1..].iter().map(|kerb| polyline("KERB", kerb, true, 1.0));
+    let ways = lines.iter().map(|line| polyline("LANE", &line.line, false, 1.0));
+    let message = read(&kerbs.chain(ways).collect::<String>(), &layers()).unwrap_err();
+    assert!(message.contains("the road's outer kerb is needed"), "{message}");
 }

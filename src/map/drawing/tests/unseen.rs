@@ -2,9 +2,9 @@
 
 use super::*;
 
-/// A circle on a layer, with further pairs of a code and a value.
+/// A circle on the road, on a layer, with further pairs of a code and a value.
 fn circle(layer: &str, pairs: &str) -> String {
-    format!("0\nCIRCLE\n8\n{layer}\n{pairs}10\n{}\n20\n{}\n40\n1\n", AT.x + 60.0, AT.y + 60.0)
+    format!("0\nCIRCLE\n8\n{layer}\n{pairs}10\n{}\n20\n{}\n40\n1\n", AT.x, AT.y + 13.0)
 }
 
 /// The drawing with a table of layers, each with its pairs of a code and a value.
