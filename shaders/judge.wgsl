@@ -31,11 +31,14 @@ fn depth_on_apron(truck: Truck) -> f32 {
     let middle = trailer_position(rig, truck);
     let heading = direction(truck.trailer_heading);
     let across = rig.trailer_body.half_width * vec2<f32>(-heading.y, heading.x);
-    // What the tractor keeps to ends where an apron begins.
-    let field = field_at(truck.route);
-    let left = field_sample(field, true, middle + across).distance;
-    let right = field_sample(field, true, middle - across).distance;
-    return max(-min(left, right), 0.0);
+    return max(max(wheel_on_apron(truck.route, middle + across), wheel_on_apron(truck.route, middle - across)), 0.0);
+}
+
+// How far a wheel is on an apron (m). What the tractor keeps to ends where an apron begins; what both keep to is none.
+fn wheel_on_apron(route: u32, wheel: vec2<f32>) -> f32 {
+    let tractor = field_sample(unit_field_at(route, 0u), true, wheel).distance;
+    let trailer = field_sample(unit_field_at(route, 1u), true, wheel).distance;
+    return min(trailer, 0.0) - tractor;
 }
 
 // Judges a truck's step, with the contact that it had.

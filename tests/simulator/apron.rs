@@ -111,16 +111,19 @@ fn on_an_apron_a_trailer_stands_clear_and_a_tractor_does_not() {
 fn the_reward_weighs_how_far_the_trailers_wheels_are_on_an_apron_and_nothing_else_does() {
     let kerbs = road("40m").unit_kerbs(Gutter::Drivable);
     let (mut world, field) = on_kerbs(&kerbs);
-    let radius = Road::named("40m").unwrap().island_radius();
+    let plain = Road::named("40m").unwrap();
+    let (island, outer) = (plain.island_radius(), plain.ground().outer_radius);
     let rig = world.rigs[0];
-    // The trailer stands along a tangent of the island, its left wheel so far inside of the kerb's face.
-    let deep = |depth: f64| {
-        let middle = DVec2::new(0.0, -(radius - depth + f64::from(rig.trailer_body.half_width)));
+    // The trailer stands along a tangent of the island, so far from its centre.
+    let at = |radius: f64| {
         let front = Vec2::new(rig.trailer_wheelbase - rig.fifth_wheel, 0.0);
-        Truck { position: middle.as_vec2() + front, ..Truck::default() }
+        Truck { position: Vec2::new(0.0, -radius as f32) + front, ..Truck::default() }
     };
-    let depths = [-0.5, -0.02, 0.02, 0.3, 0.98, 1.4];
-    let trucks = depths.map(deep);
+    // Its left wheel is so far inside of the island's face or, last, its right one beyond the outer kerb.
+    let depths = [-0.5, -0.02, 0.02, 0.3, 0.98, 1.4, -5.0];
+    let half_width = f64::from(rig.trailer_body.half_width);
+    let mut trucks = depths.map(|depth| at(island - depth + half_width));
+    trucks[depths.len() - 1] = at(outer - half_width + 0.5);
     let rewards = |engine: &Engine, world: &World| {
         let mut simulator = after_stage(engine, world, &field, &trucks, Stage::Collide);
         simulator.run_stage(Stage::Judge);

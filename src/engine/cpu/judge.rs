@@ -40,10 +40,12 @@ pub fn depth_on_apron(world: &World, truck: &Truck) -> f32 {
     let (middle, heading) = (truck.trailer_position(rig), direction(truck.trailer_heading));
     let across = rig.trailer_body.half_width * Vec2::new(-heading.y, heading.x);
     let [left, right] = [middle + across, middle - across];
-    // What the tractor keeps to ends where an apron begins.
-    let field = world.route_field(truck.route);
-    let [left, right] = field.sample(Purpose::Exact, &[left.x, right.x], &[left.y, right.y]).distance;
-    (-left.min(right)).max(0.0)
+    let [tractor, trailer] = world
+        .unit_fields(truck.route)
+        .map(|field| field.sample(Purpose::Exact, &[left.x, right.x], &[left.y, right.y]).distance);
+    // What the tractor keeps to ends where an apron begins; what both keep to is none.
+    let on = |wheel: usize| trailer[wheel].min(0.0) - tractor[wheel];
+    on(0).max(on(1)).max(0.0)
 }
 
 /// Why the episode ended, [`Ended::Running`] when it did not.
