@@ -254,7 +254,8 @@ fn list(file: &Path, map: &Map) -> Result<(), Error> {
     // Writing to a string cannot fail.
     let (mut drivable, mut refused) = (0, None);
     for ring in map.rings() {
-        let (x, y) = (ring.centre.x, ring.centre.y);
+        // Rounded, not -0.0.
+        let [x, y] = [ring.centre.x, ring.centre.y].map(|value| (10.0 * value).round() / 10.0 + 0.0);
         let _ =
             write!(text, "ring {x:.1},{y:.1}: island {:.2} m, within {:.2} m of a circle", ring.radius, ring.residual);
         match map.ground(&ring, &Options::default()) {

@@ -215,8 +215,9 @@ pub(super) fn check_vehicle(vehicle: &Vehicle) -> Result<(), Invalid> {
 }
 
 fn check_model(key: &str, model: &Model, trailer_wheelbase: f64) -> Result<(), Invalid> {
-    // The trailer's lever stays positive.
-    within(&format!("{key}.slip_lever"), model.slip_lever, [0.0, trailer_wheelbase - 0.01])?;
+    // The trailer's lever stays positive; to a nanometre, as decimals are subtracted.
+    let longest = ((trailer_wheelbase - 0.01) * 1e9).round() / 1e9;
+    within(&format!("{key}.slip_lever"), model.slip_lever, [0.0, longest])?;
     let times = [("yaw_lag", model.yaw_lag), ("drive_lag", model.drive_lag), ("brake_lag", model.brake_lag)];
     times.into_iter().try_for_each(|(name, value)| within(&format!("{key}.{name}"), value, [0.0, 1e6]))?;
     model.power.map_or(Ok(()), |power| within(&format!("{key}.power"), power, POSITIVE))?;

@@ -88,6 +88,9 @@ fn a_scenario_changed_in_memory_is_checked_before_it_is_baked() {
     let near = refused(|scenario| scenario.stray_distance = 0.5);
     assert!(near.starts_with("stray_distance: 0.5; at least spacing, "), "{near}");
     assert!(refused(|scenario| scenario.cell = 1e-9).starts_with("cell: 0.000000001; "));
+    let short =
+        refused(|scenario| (scenario.vehicle.trailer.wheelbase, scenario.vehicle.model.slip_lever) = (3.766, 9.0));
+    assert_eq!(short, "vehicle.model.slip_lever: 9; must lie in 0..3.756");
     let rigid = refused(|scenario| scenario.vehicle.tractor.suspension.roll_gain = 0.0);
     assert!(rigid.starts_with("vehicle.tractor.suspension.roll_gain: 0; must lie in 0.000001.."), "{rigid}");
 }
