@@ -49,12 +49,18 @@ pub struct Run<'a> {
     pub validation: Option<Validation>,
     checkpointer: Checkpointer,
     kept: KeptPolicies,
-    /// Env steps of the checkpoint that it continues from, until a later policy is written.
-    continued: Option<u64>,
+    /// What it continues from, until a later policy is written.
+    continued: Option<Continued<'a>>,
 }
 
 /// Has what was reported of an earlier policy of a run no longer hold.
-pub type Outdate<'f> = &'f dyn Fn(&Run) -> Result<(), Error>;
+pub type Outdate<'a> = Box<dyn Fn(&Run) -> Result<(), Error> + 'a>;
+
+/// The checkpoint that a run continues from.
+struct Continued<'a> {
+    env_steps: u64,
+    outdate: Outdate<'a>,
+}
 
 impl<'a> Run<'a> {
     /// A run at its beginning. Its first checkpoint is written at once.
@@ -87,11 +93,10 @@ impl<'a> Run<'a> {
     }
 
     /// Trains until the budget is spent or `stopped` says so. A diverged learner and a failed device are errors; a file
-    /// that cannot be written is reported and tried again. A run that continues calls `outdate` before it writes its
-    /// first policy.
-    pub fn learn(&mut self, stopped: impl Fn() -> bool, outdate: Outdate) -> Result<(), Error> {
+    /// that cannot be written is reported and tried again.
+    pub fn learn(&mut self, stopped: impl Fn() -> bool) -> Result<(), Error> {
         let backend = self.backend.clone();
-        match backend.guarded(|| self.learn_until(&stopped, outdate)) {
+        match backend.guarded(|| self.learn_until(&stopped)) {
             Err(error) if error.is_device_failure() => {
                 let message = match error {
                     Error::Device(message) => message,
@@ -103,11 +108,11 @@ impl<'a> Run<'a> {
         }
     }
 
-    fn learn_until(&mut self, stopped: &impl Fn() -> bool, outdate: Outdate) -> Result<(), Error> {
+    fn learn_until(&mut self, stopped: &impl Fn() -> bool) -> Result<(), Error> {
         while self.progress.fraction() < 1.0 && !stopped() {
             if self.is_refinement_due() {
                 self.refine()?;
-                self.checkpoint_if_due(outdate)?;
+                self.checkpoint_if_due()?;
                 continue;
             }
             let is_warm = self.training.is_warm()?;
@@ -127,7 +132,7 @@ impl<'a> Run<'a> {
                 }
                 self.progress.show_if_due();
             }
-            self.checkpoint_if_due(outdate)?;
+            self.checkpoint_if_due()?;
         }
         // With a budget of time the clock may have ended the loop just before the last one. A run that was stopped is due
         // for none that it would not have had otherwise.
@@ -250,9 +255,9 @@ impl<'a> Run<'a> {
     }
 
     /// Writes the last checkpoint, policy and row. Everything is tried before the first failure is returned.
-    pub fn close(&mut self, outdate: Outdate) -> Result<(), Error> {
+    pub fn close(&mut self) -> Result<(), Error> {
         self.check()?;
-        self.begin_checkpoint(outdate)?;
+        self.begin_checkpoint()?;
         let written = self.checkpointer.wait();
         // The last row is not in the checkpoint: a run that continues takes it back.
         self.add_sums()?;
@@ -261,23 +266,23 @@ impl<'a> Run<'a> {
         written.map_or(Ok(()), |Written { checkpoint, policy }| checkpoint.and(policy)).and(row).and(routes)
     }
 
-    fn checkpoint_if_due(&mut self, outdate: Outdate) -> Result<(), Error> {
+    fn checkpoint_if_due(&mut self) -> Result<(), Error> {
         if let Some(Written { checkpoint, policy }) = self.checkpointer.finished() {
             self.progress.note(self.checkpointer.file(), checkpoint);
             self.progress.note(self.checkpointer.policy(), policy);
         }
         if self.checkpointer.is_due() {
             self.check()?;
-            self.begin_checkpoint(outdate)?;
+            self.begin_checkpoint()?;
         }
         Ok(())
     }
 
     /// Begins to write a checkpoint and the policy.
-    fn begin_checkpoint(&mut self, outdate: Outdate) -> Result<(), Error> {
-        if self.continued.is_some_and(|env_steps| env_steps < self.progress.env_steps()) {
-            outdate(self)?;
-            self.continued = None;
+    fn begin_checkpoint(&mut self) -> Result<(), Error> {
+        let env_steps = self.progress.env_steps();
+        if let Some(continued) = self.continued.take_if(|continued| continued.env_steps < env_steps) {
+            (continued.outdate)(self)?;
         }
         let policy = self.policy()?.to_bytes();
         let mut columns = Columns::default();
@@ -289,8 +294,8 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Continues from a checkpoint of this run.
-    pub fn restore(&mut self, stored: &Stored) -> Result<(), Error> {
+    /// Continues from a checkpoint of this run. `outdate` is called before the first policy after it is written.
+    pub fn restore(&mut self, stored: &Stored, outdate: Outdate<'a>) -> Result<(), Error> {
         if stored.world() != self.fingerprint {
             let what = self.config.training_benchmark.as_ref().unwrap_or(&self.config.benchmark);
             return Err(stored.error(changed(what)));
@@ -304,13 +309,13 @@ impl<'a> Run<'a> {
                 self.progress.show_validation(last.success, best.success);
             }
         }
-        self.continued = Some(self.progress.env_steps());
+        self.continued = Some(Continued { env_steps: self.progress.env_steps(), outdate });
         self.training.restore(stored, self.progress.updates())
     }
 
     /// Whether it continued, and has made no step since.
     pub fn has_learned_nothing(&self) -> bool {
-        self.continued == Some(self.progress.env_steps())
+        self.continued.as_ref().is_some_and(|continued| continued.env_steps == self.progress.env_steps())
     }
 
     /// Lets go of policies that were kept after the point from which the run goes on.

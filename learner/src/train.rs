@@ -193,7 +193,13 @@ impl Training {
                 let file = shown_path(&folder.metrics());
                 caller.tell(Event::Warning(&format!("{file}: is missing: its rows begin again here")));
             }
-            run.restore(&stored)?;
+            // The earlier evaluation is of another policy as soon as there is a later one.
+            let outdate = |run: &Run| {
+                files::write_json(&folder.report(), &Outcome { interrupted: true, ..Outcome::of(config, run) })?;
+                let _ = std::fs::remove_file(folder.page());
+                Ok(())
+            };
+            run.restore(&stored, Box::new(outdate))?;
             resumed = Some((run.progress.env_steps(), run.progress.seconds()));
         }
         run.continue_kept()?;
@@ -211,15 +217,9 @@ impl Training {
             rewards: &config.changed_rewards(),
             device: &run.device(),
         }));
-        // The earlier evaluation is of another policy as soon as there is a later one.
-        let outdate = |run: &Run| {
-            files::write_json(&folder.report(), &Outcome { interrupted: true, ..Outcome::of(config, run) })?;
-            let _ = std::fs::remove_file(folder.page());
-            Ok(())
-        };
-        run.learn(|| caller.stops(), &outdate)?;
+        run.learn(|| caller.stops())?;
         let outcome = Outcome::of(config, &run);
-        let written = run.close(&outdate);
+        let written = run.close();
         let policy = run.policy()?;
         if outcome.interrupted && run.has_learned_nothing() && is_evaluated(&folder) {
             written?;

@@ -44,17 +44,14 @@ fn a_device_that_fails_ends_the_run_with_its_last_checkpoint_intact() {
     let device = device.device.clone();
     let asked = Cell::new(0);
     let error = run
-        .learn(
-            || {
-                asked.set(asked.get() + 1);
-                // By then a checkpoint has been written: they are due every 6 ms.
-                if asked.get() == 20 {
-                    device.destroy();
-                }
-                false
-            },
-            &|_| Ok(()),
-        )
+        .learn(|| {
+            asked.set(asked.get() + 1);
+            // By then a checkpoint has been written: they are due every 6 ms.
+            if asked.get() == 20 {
+                device.destroy();
+            }
+            false
+        })
         .unwrap_err();
     let text = error.to_string();
     assert!(text.contains("checkpoint.safetensors is the last good checkpoint"), "{text}");
@@ -70,8 +67,8 @@ fn the_critics_loss_goes_down() {
     let place = tempfile::tempdir().unwrap();
     let (mut run, folder, _) =
         run(place.path(), &["steps=20000", "learning.updates_per_step=2", "learning.critic_learning_rate=0.003"]);
-    run.learn(|| false, &|_| Ok(())).unwrap();
-    run.close(&|_| Ok(())).unwrap();
+    run.learn(|| false).unwrap();
+    run.close().unwrap();
     let metrics = std::fs::read_to_string(folder.metrics()).unwrap();
     let losses: Vec<f32> = metrics.lines().skip(1).filter_map(|row| row.split(',').nth(6)?.parse().ok()).collect();
     assert!(40 < losses.len(), "{metrics}");
