@@ -3,10 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use offtrack::files::reader::{self, shown_path};
-use offtrack::scenario::Split;
+use offtrack::scenario::{Scenario, Split};
+use offtrack::world::World;
 use offtrack_evaluation::actions;
 use offtrack_evaluation::avoidable::{self, contacts};
 use offtrack_evaluation::certificate::attempt::{HOLD, passes};
+use offtrack_evaluation::certificate::beam::Pass;
 use offtrack_evaluation::certificate::{certified, check_delay, check_table};
 use offtrack_evaluation::comparison::Asked;
 use offtrack_evaluation::error::Error;
@@ -125,8 +127,8 @@ impl Written<'_> {
     }
 }
 
-/// Runs the command.
-pub fn run(args: &Args) -> Result<(), Error> {
+/// An error for flags that make no sense, alone or together; gives the widths of the searches.
+fn checked(args: &Args) -> Result<Vec<Pass>, Error> {
     if let Some(episodes) = args.episodes.filter(|episodes| !(1..=100_000).contains(episodes)) {
         return Err(Error::Setting {
             name: "--episodes",
@@ -144,21 +146,30 @@ pub fn run(args: &Args) -> Result<(), Error> {
         &[&args.policy.files()[..], &read[..]].concat(),
     )?;
     args.films.as_deref().map(check_no_films).transpose()?;
+    Ok(passes)
+}
+
+/// An error where what is asked for cannot be had in this world.
+fn check_world(args: &Args, scenario: &Scenario, world: &World) -> Result<(), Error> {
+    if args.certify {
+        check_table(world)?;
+        check_delay(world)?;
+    }
+    if let Some(seconds) = &args.avoidable {
+        avoidable::check(scenario, world, seconds)?;
+    }
+    if args.actions.is_some() { actions::check_levels(world) } else { Ok(()) }
+}
+
+/// Runs the command.
+pub fn run(args: &Args) -> Result<(), Error> {
+    let passes = checked(args)?;
     let device = args.device.open()?;
     let split = args.split;
     let asked = args.policy.asked(&args.benchmark, args.load.as_deref(), &args.route);
     let scenario = roads::asked(&asked, split)?;
     let world = roads::world(&scenario)?;
-    if args.certify {
-        check_table(&world)?;
-        check_delay(&world)?;
-    }
-    if let Some(seconds) = &args.avoidable {
-        avoidable::check(&scenario, &world, seconds)?;
-    }
-    if args.actions.is_some() {
-        actions::check_levels(&world)?;
-    }
+    check_world(args, &scenario, &world)?;
     let mut policy = args.policy.open(&scenario, &world, &device.engine, args.seed)?;
     let n_routes = scenario.split(split).len();
     let episodes = args.episodes.unwrap_or_else(|| usual_episodes(n_routes));
@@ -174,22 +185,12 @@ pub fn run(args: &Args) -> Result<(), Error> {
         args.certified.as_ref().map(|file| certified(file, &scenario, &world, scenario.split(split))).transpose()?;
     let (seed, record) = (args.seed, args.html.is_some());
     let evaluation = Evaluation { scenario: &scenario, world: &world, split, episodes, seed, record, device: &device };
-    let Driven { episodes: finished, tracks, sequences } = {
+    let driven = {
         let bar = progress::Bar::new("evaluating", "episodes", episodes * n_routes);
         evaluation.drive(policy.as_mut(), &mut |done, all| bar.set(done, all))?
     };
-    let searched = if args.certify {
-        let n_searches = to_search(&finished).count();
-        let bar = progress::Bar::new("certifying", "starts", n_searches);
-        Some(evaluation.possible(&finished, &passes, &|| bar.advance())?)
-    } else {
-        None
-    };
-    let mut report = evaluation.summarised(policy.name(), &finished, searched);
-    if let Some(seconds) = &args.avoidable {
-        let bar = progress::Bar::new("avoiding", "contacts", contacts(&finished).count());
-        report.avoidable = Some(evaluation.avoidable(&finished, &sequences, seconds, &|| bar.advance())?);
-    }
+    let mut report = reported(args, &evaluation, policy.name(), &driven, &passes)?;
+    let Driven { episodes: finished, tracks, sequences } = driven;
     report.certified = possible.and_then(|possible| {
         let chunks = scenario.split(split).iter().zip(finished.chunks(episodes));
         let kept: Vec<&Episode> =
@@ -211,6 +212,29 @@ pub fn run(args: &Args) -> Result<(), Error> {
         args.films.as_deref().map_or(Ok(()), |folder| write_films(folder, &evaluation, &report, &sequences)),
     ];
     done.into_iter().collect()
+}
+
+/// The report, with the searches that are asked for.
+fn reported(
+    args: &Args,
+    evaluation: &Evaluation,
+    policy: &str,
+    driven: &Driven,
+    passes: &[Pass],
+) -> Result<Report, Error> {
+    let finished = &driven.episodes;
+    let searched = if args.certify {
+        let bar = progress::Bar::new("certifying", "starts", to_search(finished).count());
+        Some(evaluation.possible(finished, passes, &|| bar.advance())?)
+    } else {
+        None
+    };
+    let mut report = evaluation.summarised(policy, finished, searched);
+    if let Some(seconds) = &args.avoidable {
+        let bar = progress::Bar::new("avoiding", "contacts", contacts(finished).count());
+        report.avoidable = Some(evaluation.avoidable(finished, &driven.sequences, seconds, &|| bar.advance())?);
+    }
+    Ok(report)
 }
 
 /// Films an example of each of the commonest causes of failure: `1-trailer-on-the-island.gif` and the like.

@@ -1,6 +1,7 @@
 //! Says whether vehicles fit through roads: a row for each route and vehicle, as a table and as files, which a later
 //! call of the same command continues.
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::{Duration, Instant, SystemTime};
@@ -123,7 +124,10 @@ pub fn run(args: &Args) -> Result<bool, Error> {
     }
     let Work { file, bar, .. } = work;
     drop(bar);
-    results.rows.sort_by_key(|row| order.iter().position(|key| *key == (row.route.clone(), row.vehicle.clone())));
+    // Rows of earlier calls that nobody asked for come first.
+    let ranks = order.iter().enumerate().map(|(rank, (route, vehicle))| ((route.as_str(), vehicle.as_str()), rank));
+    let ranks: HashMap<(&str, &str), usize> = ranks.collect();
+    results.rows.sort_by_key(|row| ranks.get(&(row.route.as_str(), row.vehicle.as_str())).copied());
     results.write(&file)?;
     files::write_whole(&args.output.join("fits.csv"), csv(&results.rows).as_bytes())?;
     files::write_whole(&args.output.join("verdicts.csv"), verdicts(&results.rows).as_bytes())?;

@@ -77,8 +77,8 @@ enum Format {
     Json,
 }
 
-/// Runs the command.
-pub fn run(args: &Args) -> Result<(), Error> {
+/// The format of the file, once what is asked for makes sense.
+fn checked(args: &Args) -> Result<Format, Error> {
     let format = format(&args.output)?;
     outputs::distinct(&[("--output", Some(&args.output))], &args.policy.files())?;
     if let (Some(size), Format::Svg | Format::Json) = (args.size, format) {
@@ -123,6 +123,12 @@ pub fn run(args: &Args) -> Result<(), Error> {
             expected: "is given twice; each load once".into(),
         });
     }
+    Ok(format)
+}
+
+/// Runs the command.
+pub fn run(args: &Args) -> Result<(), Error> {
+    let format = checked(args)?;
     let engine = args.device.open()?.engine;
     let loads: Vec<Option<&str>> =
         if args.load.is_empty() { vec![None] } else { args.load.iter().map(|load| Some(load.as_str())).collect() };

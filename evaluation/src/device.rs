@@ -19,27 +19,31 @@ pub const NOT_BUILT_IN: &str =
 pub struct Device {
     /// The engine.
     pub engine: Engine,
-    /// `cpu` or `gpu`.
-    pub kind: &'static str,
     /// Name for results: `cpu`, whose processor results name elsewhere, or the adapter with its interface and driver.
     pub name: String,
-    adapter: String,
+    /// None is the processor.
+    adapter: Option<String>,
 }
 
 impl Device {
     /// The processor.
     pub fn processor() -> Device {
-        Device { engine: Engine::Cpu, kind: "cpu", name: "cpu".to_owned(), adapter: String::new() }
+        Device { engine: Engine::Cpu, name: "cpu".to_owned(), adapter: None }
     }
 
-    /// The adapter's own name, with which it can be opened again.
-    pub fn adapter(&self) -> &str {
-        &self.adapter
+    /// The adapter's own name, with which it can be opened again; none of the processor.
+    pub fn adapter(&self) -> Option<&str> {
+        self.adapter.as_deref()
+    }
+
+    /// `cpu` or `gpu`, in results.
+    pub fn kind(&self) -> &'static str {
+        if self.adapter.is_none() { "cpu" } else { "gpu" }
     }
 
     /// Name for people: of the processor or of the adapter.
     pub fn title(&self) -> String {
-        if self.kind == "cpu" { provenance::machine() } else { self.name.clone() }
+        if self.adapter.is_none() { provenance::machine() } else { self.name.clone() }
     }
 }
 
@@ -51,7 +55,7 @@ pub fn open(adapter: Option<&str>) -> Result<Device, Error> {
     match gpu::Device::open(adapter) {
         Ok(device) => {
             let (name, adapter) = (device.name(), device.adapter.get_info().name);
-            Ok(Device { engine: Engine::Gpu { device, columns: gpu::Columns::new() }, kind: "gpu", name, adapter })
+            Ok(Device { engine: Engine::Gpu { device, columns: gpu::Columns::new() }, name, adapter: Some(adapter) })
         }
         Err(gpu::Error::UnknownAdapter { name, found }) => {
             let expected = format!("no adapter's name contains this; there is {}", found.join(", "));

@@ -2,7 +2,7 @@
 //! to a terminal.
 
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use offtrack::files::reader::printable;
 use offtrack::files::writer;
@@ -11,11 +11,6 @@ use serde::Serialize;
 use crate::error::Error;
 
 pub use writer::remove_temporaries;
-
-/// The repository that the program was built from.
-pub fn repository() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new(".")).to_owned()
-}
 
 /// Prints a command's result: lines, in which names of files may stand. A closed standard output is an error, never a
 /// panic.

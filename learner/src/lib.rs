@@ -31,3 +31,9 @@ pub mod columns; // networks and optimizers there
 pub mod generator; // random numbers with a state
 
 pub use train::{resume, train};
+
+/// The repository, whose files tests read.
+#[cfg(test)]
+fn repository() -> std::path::PathBuf {
+    std::path::Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("a crate's folder lies in it").to_owned()
+}

@@ -186,7 +186,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
         false => None,
     };
     let mut scale = Scale {
-        engine: device.kind,
+        engine: device.kind(),
         device: device.name.clone(),
         machine: provenance::machine(),
         threads: rayon::current_num_threads(),
@@ -236,7 +236,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
             };
             let work = || measured(&mut mode.driven(setting)?, args.seconds);
             // The tensor library panics where a device fails.
-            let outcome = if device.kind == "gpu" { panics::caught(work, || None) } else { work() };
+            let outcome = if device.adapter().is_some() { panics::caught(work, || None) } else { work() };
             let outcome = match outcome {
                 Ok(measured) => Outcome::Measured(Box::new(measured)),
                 Err(error) => {

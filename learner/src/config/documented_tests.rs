@@ -3,7 +3,6 @@
 use std::collections::BTreeSet;
 
 use super::*;
-use offtrack_evaluation::files;
 
 /// The folder of the training files, in the repository.
 const CONFIGS: &str = "learner/configs";
@@ -172,7 +171,7 @@ fn faults(keys: &[String], blocks: &[Block]) -> (BTreeSet<String>, usize) {
 }
 
 fn text_of(file: &str) -> String {
-    std::fs::read_to_string(files::repository().join(CONFIGS).join(file).with_extension("toml")).unwrap()
+    std::fs::read_to_string(crate::repository().join(CONFIGS).join(file).with_extension("toml")).unwrap()
 }
 
 #[test]

@@ -1,8 +1,7 @@
 use super::*;
-use offtrack_evaluation::files;
 
 fn default_file() -> String {
-    std::fs::read_to_string(files::repository().join("learner/configs/default.toml")).unwrap()
+    std::fs::read_to_string(crate::repository().join("learner/configs/default.toml")).unwrap()
 }
 
 /// What reading `text` as a training file gives.
@@ -161,7 +160,7 @@ fn a_key_that_works_on_the_processor_alone_is_refused_for_a_device() {
     let on_device = format!("device = \"gpu\"\n{plain}");
     assert_eq!(read(&on_device).unwrap().device, Device::Gpu);
     let exploration = "[exploration]\ninitial_fraction = 1.0\nfinal_fraction = 0.1\nsteps = 1000\n";
-    let lane = std::fs::read_to_string(files::repository().join("learner/configs/lane.toml")).unwrap();
+    let lane = std::fs::read_to_string(crate::repository().join("learner/configs/lane.toml")).unwrap();
     let refinement = &lane[lane.find("\n[refinement]").unwrap()..];
     let tables = [("exploration", exploration), ("refinement", refinement)];
     let with_tables = tables.map(|(key, table)| (key, format!("{plain}\n{table}")));
@@ -231,7 +230,7 @@ fn any_value_of_any_key_is_taken_or_refused_by_its_key() {
 
 /// What reading the default file with some keys set gives.
 pub(super) fn with_set(settings: &[&str]) -> Result<Config, String> {
-    let file = files::repository().join("learner/configs/default.toml");
+    let file = crate::repository().join("learner/configs/default.toml");
     let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
     Config::read_with(&file, &settings).map_err(|error| error.to_string())
 }
@@ -254,7 +253,7 @@ fn a_benchmark_of_ones_own_takes_the_place_of_all_that_a_training_file_says_of_o
 
 #[test]
 fn every_training_file_reads_by_path_and_by_name() {
-    let folder = files::repository().join("learner/configs");
+    let folder = crate::repository().join("learner/configs");
     let files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     assert_eq!(files.len(), 14);
     for file in files {
@@ -265,7 +264,7 @@ fn every_training_file_reads_by_path_and_by_name() {
     let copies = tempfile::tempdir().unwrap();
     for name in ["best", "traffic-refined"] {
         let copy = copies.path().join("mine.toml");
-        std::fs::copy(files::repository().join(format!("learner/configs/{name}.toml")), &copy).unwrap();
+        std::fs::copy(crate::repository().join(format!("learner/configs/{name}.toml")), &copy).unwrap();
         assert_eq!(Config::read(&copy).map_err(|error| error.to_string()), Ok(Config::read(Path::new(name)).unwrap()));
     }
     let message = Config::read(Path::new("papre")).unwrap_err().to_string();

@@ -10,10 +10,9 @@ use rand::SeedableRng;
 
 use super::*;
 use crate::generator::Generator;
-use offtrack_evaluation::files;
 
 fn scenario() -> Scenario {
-    Scenario::read(&files::repository().join(Path::new("scenarios/attard2023.toml"))).unwrap()
+    Scenario::read(&crate::repository().join(Path::new("scenarios/attard2023.toml"))).unwrap()
 }
 
 /// The world mirrored at the x axis: left-hand traffic, clockwise.

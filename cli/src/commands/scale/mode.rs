@@ -86,8 +86,8 @@ impl Learner {
 pub(super) struct Setting<'a> {
     /// What steps the trucks.
     pub engine: &'a Engine,
-    /// Name of the engine's adapter.
-    pub adapter: &'a str,
+    /// Name of the engine's adapter; none of the processor.
+    pub adapter: Option<&'a str>,
     /// The engine as a backend of the learner too, once a mode has needed that.
     pub backend: &'a mut Option<Backend>,
     /// The world.
@@ -209,7 +209,7 @@ impl Mode {
         let opened = match backend.take() {
             Some(backend) => backend,
             None if matches!(engine, Engine::Cpu) => Backend::Host,
-            None => Backend::on_device(Some(adapter))?,
+            None => Backend::on_device(adapter)?,
         };
         let backend = backend.insert(opened);
         let config = learner.config(self, envs);
