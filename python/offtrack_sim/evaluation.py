@@ -46,7 +46,7 @@ class Evaluation:
     - ``lane_distance_mean``, ``lane_distance_max`` [m]; ``outside_lane``, a fraction of the steps;
     - ``tractor_clearance_min``, ``trailer_clearance_min`` [m], negative beyond a kerb;
     - ``load_transfer_ratio_peak``, 1 where wheels lift; ``articulation_peak`` [rad]; ``off_tracking_peak`` [m];
-    - ``on_apron``, furthest that a wheel of the trailer was on an apron [m]; NaN on a road without one.
+    - ``on_apron``, furthest that a wheel of the trailer was on an apron [m], 0 on a road without one.
 
     ``pandas.DataFrame(table)`` takes it, and ``np.savetxt(file, table, "%s", ",", header=",".join(table.dtype.names),
     comments="")`` writes it.

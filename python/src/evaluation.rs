@@ -128,7 +128,7 @@ fn columns<'py>(py: Python<'py>, starts: &[Start], episodes: &[Episode]) -> PyRe
         ("load_transfer_ratio_peak", |episode| episode.load_transfer_ratio_peak),
         ("articulation_peak", |episode| episode.articulation_peak),
         ("off_tracking_peak", |episode| episode.off_tracking_peak),
-        ("on_apron", |episode| episode.on_apron.unwrap_or(f64::NAN)),
+        ("on_apron", |episode| episode.on_apron.unwrap_or(0.0)),
         ("term_waypoints", |episode| episode.terms.waypoints),
         ("term_lane_distance", |episode| episode.terms.lane_distance),
         ("term_clearance", |episode| episode.terms.clearance),
