@@ -116,7 +116,8 @@ fn is_beside(file: &str, this: &str) -> bool {
         return file.strip_prefix(repository).is_some_and(|file| OWN.iter().any(|folder| file.starts_with(folder)));
     }
     let packages = this.strip_suffix("/src/panics.rs").and_then(|package| package.rsplit_once('/'));
-    packages.is_some_and(|(folder, _)| file.strip_prefix(folder).is_some_and(|file| file.starts_with("/offtrack-")))
+    let rest = packages.and_then(|(folder, _)| file.strip_prefix(folder)?.strip_prefix("/offtrack"));
+    rest.is_some_and(|rest| rest.starts_with(['-', '/']))
 }
 
 fn message(panic: &(dyn Any + Send)) -> String {
@@ -155,6 +156,13 @@ mod tests {
             assert!(!is_beside(&format!("{packages}/{library}"), &this), "{library}");
         }
         assert!(!is_beside("src/main.rs", &this), "a program that uses the library");
+        // Vendored packages have no versions in their names.
+        let vendored = "vendor/offtrack-learner/src/panics.rs";
+        for (file, is_own) in
+            [("offtrack-policy/src/policy.rs", true), ("offtrack/src/world.rs", true), ("wgpu/src/lib.rs", false)]
+        {
+            assert_eq!(is_beside(&format!("vendor/{file}"), vendored), is_own, "{file}");
+        }
     }
 
     #[test]

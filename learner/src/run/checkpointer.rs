@@ -112,7 +112,7 @@ impl Checkpointer {
                 .and_then(|file| file.sync_all())
                 .and_then(|()| File::open(metrics)?.sync_all())
                 .and_then(|()| std::fs::rename(&part, followed(&whole)));
-            sync_name(&whole);
+            sync_name(&followed(&whole));
             if moved.is_err() {
                 // A part of a checkpoint would fill the disk for nothing.
                 let _ = std::fs::remove_file(&part);
