@@ -23,11 +23,14 @@ use offtrack_evaluation::fits::{Asked, Case, Results, Row, case};
 use rayon::prelude::*;
 
 use crate::import::PlaceArgs;
+use crate::once::once;
 use crate::progress::Bar;
 use crate::{draw, export, roads, terminal};
 
 /// Time between two writes of results that come quickly.
 const WRITE_EVERY: Duration = Duration::from_secs(2);
+/// Results are by name: each must have its own.
+const TWICE: &str = "is named twice, and results are by name; give each once, or rename a file";
 
 /// Say whether vehicles fit through roads, on their lane's centre line or by some way that a search finds.
 ///
@@ -103,9 +106,10 @@ pub fn run(args: &Args) -> Result<bool, Error> {
     }
     let vehicles: Vec<(String, Vehicle)> =
         args.vehicle_names().map(|name| vehicle(name, &args.load)).collect::<Result<_, _>>()?;
-    unlike("ROAD", roads.iter().map(stem))?;
-    unlike("--vehicle", vehicles.iter().map(|(name, _)| name.clone()))?;
-    unlike("ROAD-VEHICLE", roads.iter().flat_map(|road| vehicles.iter().map(|(name, _)| of_both(road, name))))?;
+    once("ROAD", roads.iter().map(stem), TWICE)?;
+    once("--vehicle", vehicles.iter().map(|(name, _)| name.clone()), TWICE)?;
+    let both = roads.iter().flat_map(|road| vehicles.iter().map(|(name, _)| of_both(road, name)));
+    once("ROAD-VEHICLE", both, TWICE)?;
     check_routes(&roads, &args.route)?;
     let mut results = Results::new(asked.clone(), humantime::format_rfc3339_seconds(SystemTime::now()).to_string());
     roads.iter().for_each(|road| results.add_road(road));
@@ -306,18 +310,6 @@ fn vehicle(name: &str, load: &str) -> Result<(String, Vehicle), Error> {
     let vehicle = Vehicle::find(name)?;
     draw::check_load(&vehicle, load)?;
     Ok((Source::find(Kind::Vehicle, name)?.stem(), vehicle))
-}
-
-/// Results are by name: each must have its own.
-fn unlike(flag: &'static str, names: impl Iterator<Item = String>) -> Result<(), Error> {
-    let mut seen = std::collections::HashSet::new();
-    for name in names {
-        if !seen.insert(name.clone()) {
-            let expected = "is named twice, and results are by name; give each once, or rename a file".into();
-            return Err(Error::Setting { name: flag, value: name, expected });
-        }
-    }
-    Ok(())
 }
 
 /// Names of all routes.

@@ -12,6 +12,7 @@ pub mod export;
 pub mod fits;
 pub mod generate;
 pub mod import;
+mod once; // flags: each time another value
 pub mod outputs; // files to write: each its own
 pub mod plot; // pictures by the names of their files
 mod policies; // flags: which policy

@@ -23,6 +23,7 @@ use offtrack_evaluation::files;
 use offtrack_evaluation::policies::Controller;
 use offtrack_evaluation::recording::{Of, Recorder, Recording, Track};
 
+use crate::once::once;
 use crate::{devices, outputs, policies, progress, roads};
 
 /// Record an episode: as a film, as a picture with the swept paths of both units, or as data.
@@ -116,13 +117,7 @@ fn checked(args: &Args) -> Result<Format, Error> {
         let expected = "must end in .gif, .png or .svg: data are of one episode, one --load".to_owned();
         return Err(Error::Setting { name: "--output", value: args.output.display().to_string(), expected });
     }
-    if let Some((_, twice)) = args.load.iter().enumerate().find(|(index, load)| args.load[..*index].contains(load)) {
-        return Err(Error::Setting {
-            name: "--load",
-            value: twice.clone(),
-            expected: "is given twice; each load once".into(),
-        });
-    }
+    once("--load", args.load.iter().cloned(), "is given twice; each load once")?;
     Ok(format)
 }
 

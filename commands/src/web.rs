@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use offtrack::files::reader::{read_bytes, shown_path};
 use offtrack::files::shipped::{Kind, Source};
-use offtrack::scenario::{Scenario, Split};
+use offtrack::scenario::{ActionKind, Scenario, Split};
 use offtrack_evaluation::error::Error;
 use offtrack_evaluation::files;
 use offtrack_evaluation::kept::{self, Kept};
@@ -14,6 +14,7 @@ use offtrack_evaluation::policies::{self, rule};
 use offtrack_evaluation::run_file::RunFile;
 use offtrack_policy::Policy;
 
+use crate::once::once;
 use crate::{outputs, roads};
 
 /// The benchmarks of a page of which nothing else is asked.
@@ -82,8 +83,10 @@ pub fn run(args: &Args) -> Result<(), Error> {
         let (value, expected) = (benchmarks.join(", "), "a world file holds one benchmark: name one".to_owned());
         return Err(Error::Setting { name: "--benchmark", value, expected });
     }
-    once("--benchmark", &args.benchmark)?;
-    once("--policy", &args.policy)?;
+    for (flag, values) in [("--benchmark", &args.benchmark), ("--policy", &args.policy)] {
+        // The page would list it twice.
+        once(flag, values.iter().cloned(), "is given twice: once is enough")?;
+    }
     // All that is named is read before the roads are baked.
     let baker = args.baker.as_deref().map(baker).transpose()?;
     let named = args.policy.iter().map(|name| named(name)).collect::<Result<Vec<Policy>, Error>>()?;
@@ -151,14 +154,6 @@ fn printed(parts: &[Part]) -> Result<(), Error> {
     files::print(&parts.iter().map(line).collect::<String>())
 }
 
-/// An error if a flag has a value twice: the page would list it twice.
-fn once(flag: &'static str, values: &[String]) -> Result<(), Error> {
-    let twice = values.iter().enumerate().find(|(index, value)| values[..*index].contains(value));
-    twice.map_or(Ok(()), |(_, value)| {
-        Err(Error::Setting { name: flag, value: value.clone(), expected: "is given twice: once is enough".to_owned() })
-    })
-}
-
 /// Whether a page can bake roads for all of these benchmarks; a note says why not.
 fn can_bake(sources: &[Source]) -> bool {
     let beyond = sources.iter().find_map(|source| Some((source, vehicle_beyond(source)?)));
@@ -180,7 +175,7 @@ fn scenario(name: &str, args: &Args) -> Result<Scenario, Error> {
     if let Some(split) = split {
         roads::keep(&mut scenario, split, name)?;
     }
-    if scenario.steer_levels.is_empty() {
+    if scenario.action_kind == ActionKind::Continuous {
         let expected = "a page steers by levels: the same benchmark with actions.steer_levels is needed".to_owned();
         return Err(Error::Setting { name: "actions.kind", value: "continuous".to_owned(), expected });
     }
@@ -196,11 +191,11 @@ fn ground(name: &str, scenario: Scenario, source: &Source, args: &Args) -> Resul
     };
     let is_whole = text.is_none() && args.road.is_empty() && args.split == ALL;
     let ground = Ground { scenario, world, text, is_whole };
-    fits(&ground, name, MOST_TABLE).map(|()| ground)
+    check_tables(&ground, name, MOST_TABLE).map(|()| ground)
 }
 
 /// An error if a table of a benchmark, which a command was given as `name`, has more than `most` bytes.
-fn fits(ground: &Ground, name: &str, most: usize) -> Result<(), Error> {
+fn check_tables(ground: &Ground, name: &str, most: usize) -> Result<(), Error> {
     ground.table_above(most).map_or(Ok(()), |(table, n_bytes)| {
         let expected = format!(
             "its table {table} has {n_bytes} bytes, and a browser's device takes {most}: ask for fewer of its {} roads \
@@ -281,8 +276,8 @@ mod tests {
         let world = World::bake(&scenario).unwrap().into();
         let ground = Ground { scenario, world, text: None, is_whole: false };
         let n_bytes = ground.world.all_fields().map(|field| field.values.len() * size_of::<u32>()).sum::<usize>();
-        fits(&ground, "mine.toml", n_bytes).unwrap();
-        let said = fits(&ground, "mine.toml", n_bytes - 1).unwrap_err().to_string();
+        check_tables(&ground, "mine.toml", n_bytes).unwrap();
+        let said = check_tables(&ground, "mine.toml", n_bytes - 1).unwrap_err().to_string();
         let expected = format!("--benchmark: mine.toml; its table corners has {n_bytes} bytes");
         assert!(said.starts_with(&expected) && said.contains("--road or --split"), "{said}");
     }

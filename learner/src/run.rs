@@ -134,8 +134,8 @@ impl<'a> Run<'a> {
             }
             self.checkpoint_if_due()?;
         }
-        // With a budget of time the clock may have ended the loop just before the last one. A run that was stopped is due
-        // for none that it would not have had otherwise.
+        // With a budget of time the clock may have ended the loop just before the last one. A run that was stopped is
+        // due for none that it would not have had otherwise.
         if 1.0 <= self.progress.fraction() && self.validate_if_due()? {
             self.keep_if_due(true)?;
             self.write_row()?;

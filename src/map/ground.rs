@@ -118,8 +118,8 @@ pub struct Ground {
 }
 
 impl Ground {
-    /// Distance of a point of the road from the nearest gutter or, where there is none, kerb face; 0 or less on a gutter
-    /// and off the road (m).
+    /// Distance of a point of the road from the nearest gutter or, where there is none, kerb face; 0 or less on a
+    /// gutter and off the road (m).
     pub(super) fn to_gutter(&self, p: DVec2) -> f64 {
         match &self.edges {
             Edges::Beside(width) => self.faces.signed_distance(p) - width,

@@ -1,5 +1,5 @@
-//! What kerb faces say of a road whose shape was read: the ring's radii, what each of them belongs to, and where a route
-//! comes too near to one.
+//! What kerb faces say of a road whose shape was read: the ring's radii, what each of them belongs to, and where a
+//! route comes too near to one.
 
 use std::f64::consts::TAU;
 
@@ -15,6 +15,14 @@ const NEAREST: f64 = 1.3;
 const STEP: f64 = 0.98;
 /// Parts of it, where a kerb may be nearer between two of them.
 const FINER: u32 = 20;
+
+/// What keeps the outline that begins at `start`, one of these areas but not the `outer` one, from being a kerb: the
+/// outer one, if it lies outside of that, or another one that it lies in.
+pub(super) fn misplaced(areas: &[Outline], index: usize, start: DVec2, outer: usize) -> Option<usize> {
+    let others = areas.iter().enumerate().filter(|&(other, _)| other != index);
+    let mut wrong = others.filter(|&(other, area)| area.contains(start) != (other == outer));
+    wrong.next().map(|(other, _)| other)
+}
 
 /// Radius of the ring's outer kerb: the island's and what is free beyond it between the arms.
 pub(super) fn outer_radius(faces: &Outline, island_radius: f64) -> f64 {

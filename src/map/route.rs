@@ -8,8 +8,8 @@ use glam::DVec2;
 use crate::files::reader::shown;
 use crate::geometry::Curve;
 
-/// Whether a name means the route of this name: it is the route's own, its road's, or that of the distribution, or of its
-/// seed, that the road was drawn from.
+/// Whether a name means the route of this name: it is the route's own, its road's, or that of the distribution, or of
+/// its seed, that the road was drawn from.
 pub fn is_of(route: &str, name: &str) -> bool {
     route.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
 }

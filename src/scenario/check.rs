@@ -78,7 +78,7 @@ impl Scenario {
         }
         self.disturbances.check()?;
         self.traffic.iter().try_for_each(Traffic::check)?;
-        if self.traffic.is_some() && self.step as f32 != traffic::STEP {
+        if self.is_out_of_step() {
             return Err(invalid("step", self.step, format!("{} with traffic: so long are its steps", traffic::STEP)));
         }
         if self.traffic.as_ref().is_some_and(|traffic| 1 < traffic.group) && self.start_along != 0.0 {
@@ -90,6 +90,11 @@ impl Scenario {
         }
         within("n_substeps", f64::from(self.n_substeps), self.substeps())?;
         within("vehicle.model.steer_delay", self.longest_steer_delay(), [0.0, MOST_DELAY * self.step])
+    }
+
+    /// Whether its step is not that of the vehicles around each truck.
+    pub(super) fn is_out_of_step(&self) -> bool {
+        self.traffic.is_some() && self.step as f32 != traffic::STEP
     }
 
     /// The longest steer delay of its vehicles (s).

@@ -75,7 +75,7 @@ impl Scenario {
                 expected,
             ));
         }
-        if scenario.traffic.is_some() && scenario.step as f32 != crate::traffic::STEP {
+        if scenario.is_out_of_step() {
             let expected = format!("with [traffic] {} s", crate::traffic::STEP);
             return Err(reader.invalid("time.step", format_args!("{} s", scenario.step), expected));
         }

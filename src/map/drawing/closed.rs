@@ -7,6 +7,7 @@ use super::{Entity, aprons};
 use crate::files::reader::{Error, Reader};
 use crate::geometry::{Curve, Outline, Piece};
 use crate::map::apron::crosses;
+use crate::map::kerbs::misplaced;
 
 /// Lines that cross do so farther than this from their ends (m).
 const FROM_ENDS: f64 = 0.01;
@@ -107,16 +108,15 @@ pub(super) fn kerbs(
     let start = |index: usize| drawn[index].1.point_at(0.0);
     let mut kept = Vec::new();
     for index in 0..drawn.len() {
-        if index == outer {
-            kept.push(index);
-        } else if !areas[outer].contains(start(index)) {
-            let expected = format!("must lie in the outer kerb, {}; else it belongs on another layer", drawn[outer].0);
-            return Err(refused(index, "outside", expected));
-        } else if (0..drawn.len()).any(|other| ![index, outer].contains(&other) && areas[other].contains(start(index)))
-        {
-            notes.push(format!("{}: an outline inside an island is left out", drawn[index].0));
-        } else {
-            kept.push(index);
+        let wrong = if index == outer { None } else { misplaced(&areas, index, start(index), outer) };
+        match wrong {
+            None => kept.push(index),
+            Some(other) if other == outer => {
+                let expected =
+                    format!("must lie in the outer kerb, {}; else it belongs on another layer", drawn[outer].0);
+                return Err(refused(index, "outside", expected));
+            }
+            Some(_) => notes.push(format!("{}: an outline inside an island is left out", drawn[index].0)),
         }
     }
     Ok(kept.into_iter().map(|index| drawn[index].1.clone()).collect())

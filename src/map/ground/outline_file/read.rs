@@ -9,6 +9,7 @@ use crate::files::reader::{Error, Exactly, Reader};
 use crate::geometry::{Curve, Outline, Piece, arc_of_height};
 use crate::map::apron::{self, crosses};
 use crate::map::ground::{Arm, Edges, Ground, Hand, Kerb, Line};
+use crate::map::kerbs::misplaced;
 use crate::map::route::Lane;
 
 /// Largest coordinate (m).
@@ -257,9 +258,7 @@ fn loops(
     let outer = kerbs.iter().position(|&kerb| kerb == Kerb::Outer).unwrap_or(0);
     let areas: Vec<Outline> = curves.iter().map(|curve| Outline::new(vec![curve.clone()])).collect();
     for (i, curve) in curves.iter().enumerate().filter(|&(i, _)| i != outer) {
-        let start = curve.point_at(0.0);
-        let around = areas.iter().enumerate().find(|&(j, area)| j != i && area.contains(start) != (j == outer));
-        if let Some((j, _)) = around {
+        if let Some(j) = misplaced(&areas, i, curve.point_at(0.0), outer) {
             let (found, expected) = if j == outer {
                 ("outside", format!("must lie inside the outer loop, {table}[{j}]"))
             } else {
