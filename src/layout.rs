@@ -11,6 +11,7 @@ pub(crate) mod columns;
 mod ended;
 mod extras;
 mod observation;
+mod observation_layout;
 mod rows; // a truck's rows of the columns
 mod tables; // what trucks share
 mod truck;
@@ -23,6 +24,7 @@ pub(crate) use ended::printed_codes;
 pub use extras::{EXTRAS, Extra, ObservedExtras};
 pub(crate) use observation::first_of;
 pub use observation::{OBSERVATION, Values};
+pub use observation_layout::ObservationLayout;
 pub use rows::{BeginRow, Clearance, Command, Control, Pose, Progress, RewardTerms, Start, Stream, Truck};
 pub use tables::{
     Action, BatchFacts, Body, Disturbances, FieldRow, Lag, Params, PreviewRow, Ray, Reward, Rig, Roll, RouteRow,

@@ -17,7 +17,7 @@ use crate::field::Field;
 use crate::files::cache::{Loading, Stopped};
 use crate::geometry::Outline;
 use crate::layout::{
-    Action, Disturbances, N_AROUND, N_PREVIEW, N_RAYS, N_VALUES, Params, PreviewRow, Ray, Reward, Rig, RouteRow, Truck,
+    Action, Disturbances, N_PREVIEW, N_RAYS, ObservationLayout, Params, PreviewRow, Ray, Reward, Rig, RouteRow, Truck,
     WaypointRow,
 };
 use crate::map::Frame;
@@ -194,10 +194,9 @@ impl World {
         self.traffic.as_ref().is_some_and(|traffic| traffic.is_observed)
     }
 
-    /// Values that a truck observes in all: the 69, the benchmark's extras, and those of other vehicles.
-    pub fn n_observed(&self) -> usize {
-        let around = if self.observes_vehicles() { N_AROUND } else { 0 };
-        N_VALUES + self.params.n_extras as usize + around
+    /// What a truck's observation consists of.
+    pub fn observation_layout(&self) -> ObservationLayout {
+        ObservationLayout { n_extras: self.params.n_extras as usize, has_vehicles: self.observes_vehicles() }
     }
 
     /// The vehicle of a truck of this world.

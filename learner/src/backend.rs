@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 #[cfg(feature = "gpu")]
 use offtrack::gpu;
-use offtrack::layout::{N_AROUND, N_VALUES, ObservedExtras};
+use offtrack::layout::{N_VALUES, ObservationLayout, ObservedExtras};
 use offtrack::world::World;
 
 use crate::config::{Config, Device};
@@ -101,14 +101,17 @@ impl Backend {
         routes: Vec<u32>,
         mirror: Option<Mirror>,
     ) -> Result<Box<dyn Rollout>, Error> {
-        const BLIND: usize = N_VALUES + ObservedExtras::Blind.n_extras();
-        const MASS: usize = N_VALUES + ObservedExtras::Mass.n_extras();
-        const ORACLE: usize = N_VALUES + ObservedExtras::Oracle.n_extras();
-        const AMONG: usize = N_VALUES + N_AROUND;
-        const BLIND_AMONG: usize = BLIND + N_AROUND;
-        const MASS_AMONG: usize = MASS + N_AROUND;
-        const ORACLE_AMONG: usize = ORACLE + N_AROUND;
-        match world.n_observed() {
+        const fn width(extras: ObservedExtras, has_vehicles: bool) -> usize {
+            ObservationLayout { n_extras: extras.n_extras(), has_vehicles }.n_values()
+        }
+        const BLIND: usize = width(ObservedExtras::Blind, false);
+        const MASS: usize = width(ObservedExtras::Mass, false);
+        const ORACLE: usize = width(ObservedExtras::Oracle, false);
+        const AMONG: usize = width(ObservedExtras::None, true);
+        const BLIND_AMONG: usize = width(ObservedExtras::Blind, true);
+        const MASS_AMONG: usize = width(ObservedExtras::Mass, true);
+        const ORACLE_AMONG: usize = width(ObservedExtras::Oracle, true);
+        match world.observation_layout().n_values() {
             BLIND => self.rollout_of::<BLIND>(config, world, routes, mirror),
             MASS => self.rollout_of::<MASS>(config, world, routes, mirror),
             ORACLE => self.rollout_of::<ORACLE>(config, world, routes, mirror),

@@ -3,9 +3,7 @@
 //! A truck and its sensors are symmetric, so the mirror image of a transition is a valid transition of left-hand
 //! traffic. A learner that samples both has seen every bend in both directions.
 
-use offtrack::layout::{
-    Action, EXTRAS, N_RAYS, N_TRACTOR_RAYS, N_TRAILER_RAYS, OBSERVATION, Ray, VEHICLE_VALUES, Values,
-};
+use offtrack::layout::{Action, N_RAYS, N_TRACTOR_RAYS, N_TRAILER_RAYS, OBSERVATION, Ray, VEHICLE_VALUES, Values};
 use offtrack::world::World;
 use rand::Rng;
 
@@ -41,8 +39,9 @@ impl Mirror {
         let refused = |expected: String| Error::setting("learning.mirror_augmentation", "true", expected);
         let factors =
             |groups: &'static [Values]| groups.iter().flat_map(|values| std::iter::repeat_n(values.mirror, values.n));
-        let extras = EXTRAS[..world.params.n_extras as usize].iter().map(|extra| extra.mirror);
-        let around = factors(if world.observes_vehicles() { &VEHICLE_VALUES } else { &[] });
+        let layout = world.observation_layout();
+        let extras = layout.extras().iter().map(|extra| extra.mirror);
+        let around = factors(if layout.has_vehicles { &VEHICLE_VALUES } else { &[] });
         let mut values: Vec<(usize, f32)> = factors(&OBSERVATION).chain(extras).chain(around).enumerate().collect();
         if world.rigs.iter().any(|rig| rig.crossfall != 0.0) {
             return Err(refused(

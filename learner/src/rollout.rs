@@ -6,7 +6,7 @@
 pub mod device;
 pub mod host;
 
-use offtrack::layout::{Ended, N_AROUND, N_EXTRAS, N_VALUES};
+use offtrack::layout::Ended;
 use offtrack::simulator::Simulator;
 use offtrack_policy::Normalisation;
 
@@ -95,11 +95,6 @@ pub trait Rollout {
     /// Continues after `n_updates` from what [`Rollout::save`] added; on a device with an empty replay buffer and new
     /// episodes.
     fn restore(&mut self, stored: &Stored, n_updates: u64) -> Result<(), Error>;
-}
-
-/// Values of other vehicles among `n_values` that networks observe: where there are more than those of a truck.
-pub(crate) const fn n_around(n_values: usize) -> usize {
-    if N_VALUES + N_EXTRAS < n_values { N_AROUND } else { 0 }
 }
 
 /// The normalisation of these observations: what is learned from with a mirror is symmetric.

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use burn::tensor::Device;
-use offtrack::layout::EXTRAS;
 use offtrack::world::World;
 use offtrack_policy::{Activation, Frames, Head, Layer, Normalisation, Policy};
 
@@ -39,12 +38,13 @@ impl Session {
     /// Trucks at the start of their first episodes on `routes`, an empty replay buffer, and a learner with random
     /// weights. All that can be wrong with a config in this world is an error here.
     pub fn new(backend: &Backend, config: &Config, world: Arc<World>, routes: Vec<u32>) -> Result<Session, Error> {
-        backend.check_memory(config, n_values(&world), world.actions.len())?;
-        memory::check_policy(config, n_values(&world), world.actions.len())?;
+        let n_values = world.observation_layout().n_values();
+        backend.check_memory(config, n_values, world.actions.len())?;
+        memory::check_policy(config, n_values, world.actions.len())?;
         let mirror = config.learning.mirror_augmentation.then(|| Mirror::of(&world)).transpose()?;
         Ok(Session {
             rollout: backend.rollout(config, &world, routes, mirror.clone())?,
-            sac: backend.learner(config, n_values(&world), world.actions.len())?,
+            sac: backend.learner(config, n_values, world.actions.len())?,
             ppo: None,
             normalisation: None,
             config: config.clone(),
@@ -198,7 +198,7 @@ impl Session {
 
     /// Values that the networks observe.
     fn n_values(&self) -> usize {
-        n_values(&self.world)
+        self.world.observation_layout().n_values()
     }
 
     /// The normalisation of the observations held.
@@ -217,6 +217,7 @@ impl Session {
 
     /// The policy: the EMA of the actor that learns now. Waits for a device.
     pub fn policy(&self) -> Result<Policy, Error> {
+        let layout = self.world.observation_layout();
         Ok(Policy {
             name: "the policy in training".to_owned(),
             benchmark: self.config.benchmark.clone(),
@@ -227,8 +228,8 @@ impl Session {
                 .as_ref()
                 .map_or_else(|| self.sac.actor_ema(), |ppo| ppo.actor_ema().clone())
                 .plain_layers(),
-            extras: EXTRAS[..self.world.params.n_extras as usize].iter().map(|extra| extra.name.to_owned()).collect(),
-            vehicles: self.world.observes_vehicles(),
+            extras: layout.extra_names().into_iter().map(str::to_owned).collect(),
+            vehicles: layout.has_vehicles,
             activation: Activation::Relu,
             head: Head::Levels,
             values: None,
@@ -265,10 +266,4 @@ impl Session {
         }
         Ok(())
     }
-}
-
-/// Values that networks observe in a world: those of an observation, extras and other vehicles that its benchmark
-/// observes.
-fn n_values(world: &World) -> usize {
-    world.n_observed()
 }

@@ -1,6 +1,6 @@
 //! Whether a policy can drive in a world: its extras and its actions are there.
 
-use offtrack::layout::{Action, EXTRAS, ObservedExtras};
+use offtrack::layout::{Action, ObservedExtras};
 use offtrack::world::World;
 
 use crate::error::Error;
@@ -25,7 +25,7 @@ impl Policy {
 
     fn check_extras(&self, world: &World) -> Result<(), String> {
         let listed = |names: &[&str]| if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-        let observed: Vec<&str> = EXTRAS[..world.params.n_extras as usize].iter().map(|extra| extra.name).collect();
+        let observed: Vec<&str> = world.observation_layout().extra_names();
         if let Some(values) = &self.values {
             let missing: Vec<&str> = values.extras().filter(|extra| !observed.contains(extra)).collect();
             if missing.is_empty() {

@@ -6,7 +6,7 @@
 use std::borrow::Cow;
 
 use offtrack::gpu::{self, Kernels, Slice};
-use offtrack::layout::{Column, EXTRAS, N_AROUND, N_VALUES, WORKGROUP};
+use offtrack::layout::{Column, WORKGROUP};
 use offtrack::wgpu::{CommandEncoder, ComputePassDescriptor};
 use offtrack::world::World;
 
@@ -137,23 +137,21 @@ fn check_acts(policy: &Policy) -> Result<(), Error> {
 /// the values of other vehicles: those that it does not read have weights of 0.
 fn reading_all(policy: &Policy) -> Cow<'_, Policy> {
     let Some(values) = &policy.values else { return Cow::Borrowed(policy) };
-    let extras = values.indices().iter().filter(|index| (N_VALUES..VEHICLES_AT).contains(*index));
-    let n_extras = extras.map(|index| index + 1 - N_VALUES).max().unwrap_or_default();
-    let vehicles = values.has_vehicles();
-    let n_values = N_VALUES + n_extras + if vehicles { N_AROUND } else { 0 };
+    let layout = values.observation_layout();
+    let n_values = layout.n_values();
     let mut normalisation = Normalisation::none(n_values);
     let mut layers = policy.layers.clone();
     let n_outputs = layers[0].n_outputs();
     layers[0].weights = vec![0.0; n_values * n_outputs];
     for (input, &index) in values.indices().iter().enumerate() {
-        let value = if index < VEHICLES_AT { index } else { N_VALUES + n_extras + index - VEHICLES_AT };
+        let value = if index < VEHICLES_AT { index } else { layout.vehicles_at() + index - VEHICLES_AT };
         normalisation.mean[value] = policy.normalisation.mean[input];
         normalisation.factor[value] = policy.normalisation.factor[input];
         layers[0].weights[value * n_outputs..][..n_outputs]
             .copy_from_slice(&policy.layers[0].weights[input * n_outputs..][..n_outputs]);
     }
-    let extras = EXTRAS[..n_extras].iter().map(|extra| extra.name.to_owned()).collect();
-    Cow::Owned(Policy { values: None, extras, vehicles, normalisation, layers, ..policy.clone() })
+    let extras = layout.extra_names().into_iter().map(str::to_owned).collect();
+    Cow::Owned(Policy { values: None, extras, vehicles: layout.has_vehicles, normalisation, layers, ..policy.clone() })
 }
 
 /// An error for a policy that no file could hold: one whose layers do not fit each other, or with numbers that are not

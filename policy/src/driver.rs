@@ -1,5 +1,7 @@
 //! A policy at the wheel of several trucks: what it remembers of each, from one step to the next.
 
+use std::borrow::Cow;
+
 use offtrack::layout::{N_AROUND, N_EXTRAS, N_VALUES};
 
 use crate::network::Pass;
@@ -89,7 +91,7 @@ impl Driver {
         let mut rows = policy.read(observations, extras, around);
         if policy.frames.n != 1 {
             if policy.normalises_frames() {
-                rows = policy.normalisation.apply_rows(&rows);
+                rows = Cow::Owned(policy.normalisation.apply_rows(&rows));
             }
             let (n_values, n_stacked) = (policy.n_values(), policy.n_stacked());
             let mut stacked = Vec::with_capacity(envs.len() * n_stacked);
@@ -98,9 +100,9 @@ impl Driver {
                 policy.frames.push(stack, frame, begins[env]);
                 stacked.extend_from_slice(stack);
             }
-            rows = stacked;
+            rows = Cow::Owned(stacked);
         }
-        if let Some(recurrent) = &policy.recurrent {
+        let outputs = if let Some(recurrent) = &policy.recurrent {
             let n_kept = recurrent.n_kept();
             let (before, behind) = policy.layers.split_at(recurrent.after);
             let pass = Pass { activates_last: true, ..policy.pass(before) };
@@ -116,12 +118,12 @@ impl Driver {
             for (&env, gathered) in envs.iter().zip(gathered.chunks_exact(n_kept)) {
                 kept[env * n_kept..][..n_kept].copy_from_slice(gathered);
             }
-            rows = Pass { normalisation: None, ..policy.pass(behind) }.outputs(&hidden);
+            Pass { normalisation: None, ..policy.pass(behind) }.outputs(&hidden)
         } else {
-            rows = policy.pass(&policy.layers).outputs(&rows);
-        }
+            policy.pass(&policy.layers).outputs(&rows)
+        };
         envs.iter().for_each(|&env| begins[env] = false);
-        rows
+        outputs
     }
 
     /// The index of the most probable action for what the trucks `envs` observe now, `[envs]`.

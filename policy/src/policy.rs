@@ -1,10 +1,11 @@
 //! A policy: a network with all that is needed to drive with it.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use offtrack::files::reader::{self, shown_path};
 use offtrack::layout::random::{self, Draw};
-use offtrack::layout::{Action, N_AROUND, N_EXTRAS, N_VALUES, Truck};
+use offtrack::layout::{Action, N_AROUND, N_EXTRAS, N_VALUES, ObservationLayout, Truck};
 use offtrack::world::World;
 
 use crate::driver::Driver;
@@ -135,7 +136,7 @@ impl Policy {
     /// Where the layers do not fit each other; those of a policy that was read do. And where it reads extras or has a
     /// memory: a [`Driver`] keeps that.
     pub fn logits(&self, observations: &[[f32; N_VALUES]]) -> Vec<f32> {
-        assert!(self.n_extras() == 0, "the policy observes extras: they must be given");
+        assert!(self.observation_layout().n_extras == 0, "the policy observes extras: they must be given");
         assert!(!self.reads_vehicles(), "the policy observes other vehicles: they must be given");
         self.logits_beside(observations, &[])
     }
@@ -163,11 +164,7 @@ impl Policy {
         around: &[[f32; N_AROUND]],
     ) -> Vec<f32> {
         assert!(!self.has_memory(), "the policy has a memory: a Driver keeps it");
-        let pass = self.pass(&self.layers);
-        if self.reads_all_and_nothing_else() {
-            return pass.outputs(observations.as_flattened());
-        }
-        pass.outputs(&self.read(observations, extras, around))
+        self.pass(&self.layers).outputs(&self.read(observations, extras, around))
     }
 
     /// The index of the most probable action for each observation, `[n_envs]`.
@@ -246,20 +243,20 @@ impl Policy {
         n_stack + self.recurrent.as_ref().map_or(0, Recurrent::n_kept)
     }
 
+    /// What must be observed at least for it to drive.
+    pub fn observation_layout(&self) -> ObservationLayout {
+        let all = ObservationLayout { n_extras: self.extras.len(), has_vehicles: self.vehicles };
+        self.values.as_ref().map_or(all, Selection::observation_layout)
+    }
+
     /// Values that it reads of a step.
     pub(crate) fn n_values(&self) -> usize {
-        let around = if self.vehicles { N_AROUND } else { 0 };
-        self.values.as_ref().map_or(N_VALUES + self.extras.len() + around, |values| values.indices().len())
+        self.values.as_ref().map_or_else(|| self.observation_layout().n_values(), |values| values.indices().len())
     }
 
     /// Whether it reads what other vehicles do.
     pub fn reads_vehicles(&self) -> bool {
-        self.values.as_ref().map_or(self.vehicles, Selection::has_vehicles)
-    }
-
-    /// Whether it reads the 69 values in their order.
-    fn reads_all_and_nothing_else(&self) -> bool {
-        self.values.is_none() && self.extras.is_empty() && !self.vehicles
+        self.observation_layout().has_vehicles
     }
 
     /// Values of all frames that it sees.
@@ -273,27 +270,24 @@ impl Policy {
     }
 
     /// The values that it reads of each observation, `[n_envs * values]`.
-    pub(crate) fn read(
+    pub(crate) fn read<'a>(
         &self,
-        observations: &[[f32; N_VALUES]],
+        observations: &'a [[f32; N_VALUES]],
         extras: &[[f32; N_EXTRAS]],
         around: &[[f32; N_AROUND]],
-    ) -> Vec<f32> {
-        let mut rows = Vec::with_capacity(observations.len() * self.n_values());
+    ) -> Cow<'a, [f32]> {
+        let layout = self.observation_layout();
         match &self.values {
-            None if self.reads_all_and_nothing_else() => rows.extend_from_slice(observations.as_flattened()),
+            None if layout.is_plain() => Cow::Borrowed(observations.as_flattened()),
             None => {
-                for (row, values) in observations.iter().enumerate() {
-                    rows.extend_from_slice(values);
-                    if !self.extras.is_empty() {
-                        rows.extend_from_slice(&extras[row][..self.extras.len()]);
-                    }
-                    if self.vehicles {
-                        rows.extend_from_slice(&around[row]);
-                    }
+                let mut rows = vec![0.0; observations.len() * layout.n_values()];
+                for (env, row) in rows.chunks_exact_mut(layout.n_values()).enumerate() {
+                    layout.join(row, env, observations, extras, around);
                 }
+                Cow::Owned(rows)
             }
             Some(selection) => {
+                let mut rows = Vec::with_capacity(observations.len() * self.n_values());
                 for (row, values) in observations.iter().enumerate() {
                     let value = |&index: &usize| match index {
                         ..N_VALUES => values[index],
@@ -302,9 +296,9 @@ impl Policy {
                     };
                     rows.extend(selection.indices().iter().map(value));
                 }
+                Cow::Owned(rows)
             }
         }
-        rows
     }
 
     /// A pass through some of its layers, with the normalisation unless frames were normalised before.
@@ -312,11 +306,6 @@ impl Policy {
         let was_normalised = self.frames.n != 1 && self.normalises_frames();
         let normalisation = (!was_normalised).then_some(&self.normalisation);
         Pass { normalisation, layers, activation: self.activation, activates_last: false }
-    }
-
-    /// Number of the extras that it reads.
-    fn n_extras(&self) -> usize {
-        self.values.as_ref().map_or(self.extras.len(), |values| values.extras().count())
     }
 
     pub(crate) fn assert_levels(&self) {

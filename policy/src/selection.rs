@@ -1,9 +1,9 @@
 //! The values that a policy reads of those that are observed, by their names.
 
-use offtrack::layout::{EXTRAS, N_EXTRAS, N_VALUES, OBSERVATION, VEHICLE_VALUES, Values};
+use offtrack::layout::{EXTRAS, N_VALUES, OBSERVATION, ObservationLayout, VEHICLE_VALUES, Values};
 
 /// Index of the first value of other vehicles, behind all extras.
-pub(crate) const VEHICLES_AT: usize = N_VALUES + N_EXTRAS;
+pub(crate) const VEHICLES_AT: usize = ObservationLayout::ALL.vehicles_at();
 
 /// Some of the values that are observed, in an order of their own.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -55,9 +55,13 @@ impl Selection {
         self.indices.iter().filter_map(|index| EXTRAS.get(index.checked_sub(N_VALUES)?).map(|extra| extra.name))
     }
 
-    /// Whether values of other vehicles are among them.
-    pub fn has_vehicles(&self) -> bool {
-        self.indices.iter().any(|&index| VEHICLES_AT <= index)
+    /// The least that is observed where all of the values are.
+    pub fn observation_layout(&self) -> ObservationLayout {
+        let extras = self.indices.iter().filter(|index| (N_VALUES..VEHICLES_AT).contains(*index));
+        ObservationLayout {
+            n_extras: extras.map(|index| index + 1 - N_VALUES).max().unwrap_or_default(),
+            has_vehicles: self.indices.iter().any(|&index| VEHICLES_AT <= index),
+        }
     }
 }
 
@@ -106,8 +110,9 @@ mod tests {
         let all: Vec<&str> = groups(&OBSERVATION).chain(extras).chain(groups(&VEHICLE_VALUES)).collect();
         assert_eq!(selected(&all).unwrap(), (0..VEHICLES_AT + N_AROUND).collect::<Vec<usize>>());
         assert_eq!(selected(&["entry_gone[1]", "gap"]).unwrap(), [81 + 5, 81 + 8]);
-        let has_vehicles = |name: &str| Selection::of(&[name.to_owned()]).unwrap().has_vehicles();
-        assert_eq!(["friction", "vehicle_left"].map(has_vehicles), [false, true]);
+        let layout = |names: [&str; 2]| Selection::of(&names.map(str::to_owned)).unwrap().observation_layout();
+        assert_eq!(layout(["steering", "friction"]), ObservationLayout { n_extras: 10, has_vehicles: false });
+        assert_eq!(layout(["vehicle_left", "speed"]), ObservationLayout { n_extras: 0, has_vehicles: true });
         let names = ["friction".to_owned(), "speed".to_owned(), "steering".to_owned()];
         assert_eq!(Selection::of(&names).unwrap().extras().collect::<Vec<_>>(), ["friction", "steering"]);
     }

@@ -14,14 +14,14 @@ use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray2,
     PyUntypedArrayMethods,
 };
-use offtrack::layout::{Column, Ended};
+use offtrack::layout::{Column, Ended, ObservationLayout};
 use offtrack::simulator::Autoreset;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::aligned;
 use crate::infos::{End, Infos, Names};
-use crate::observed::{self, Beside, Read};
+use crate::observed::{Read, columns_of_observation};
 use crate::worlds::{Asked, Given, Place};
 use crate::{actions, errors, geometry};
 pub use arguments::engine_of;
@@ -47,8 +47,8 @@ pub struct Batch {
     place: Place,
     names: Names,
     n_envs: usize,
-    /// What stands behind each observation's values.
-    beside: Beside,
+    /// What each observation consists of.
+    layout: ObservationLayout,
     /// What is read after a step.
     read: Vec<Column>,
     device: String,
@@ -129,13 +129,13 @@ impl Batch {
     /// Names of the extras that stand behind an observation's values.
     #[getter]
     fn extras(&self) -> Vec<&'static str> {
-        observed::names(self.beside.n_extras)
+        self.layout.extra_names()
     }
 
     /// Whether what is observed of other vehicles stands behind them.
     #[getter]
     fn observes_vehicles(&self) -> bool {
-        self.beside.has_vehicles
+        self.layout.has_vehicles
     }
 
     /// Trucks that share a road and its vehicles.
@@ -152,7 +152,7 @@ impl Batch {
     /// Values of an observation, all that stands behind among them.
     #[getter]
     pub fn n_values(&self) -> usize {
-        self.beside.n_values()
+        self.layout.n_values()
     }
 
     /// Vehicle and load of each class of the vehicles, in the benchmark's order.
@@ -189,12 +189,12 @@ impl Batch {
             let mut state = self.state()?;
             state.check_process(&self.device)?;
             let State { simulator, pool, .. } = &mut *state;
-            let columns = self.beside.columns_of_observation();
+            let columns = columns_of_observation(self.layout);
             let read = Read::of(simulator, &columns).map_err(|error| errors::of_simulator(&error))?;
-            let observation = if self.beside.is_empty() {
+            let observation = if self.layout.is_plain() {
                 PyArray1::from_slice(py, &read.rows::<f32>(Column::Observation))
             } else {
-                PyArray1::from_vec(py, pool.run(py, || read.observed(self.beside).to_vec())?)
+                PyArray1::from_vec(py, pool.run(py, || read.observed(self.layout).to_vec())?)
             };
             observation.reshape([self.n_envs, self.n_values()])
         })

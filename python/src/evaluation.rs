@@ -19,7 +19,7 @@ use pyo3::prelude::*;
 use crate::arrays::aligned;
 use crate::batch::{Batch, engine_of};
 use crate::errors::guarded;
-use crate::observed::{Beside, Observed};
+use crate::observed::Observed;
 use crate::policy::Network;
 use crate::pool::Pool;
 use crate::{actions, errors};
@@ -168,7 +168,7 @@ impl Function<'_, '_> {
         let py = self.function.py();
         let is_asked = |&env: &usize| self.begins.is_some() || batch.ended[env] == Ended::Running as u32;
         let asked: Vec<usize> = (0..batch.n_envs()).filter(is_asked).collect();
-        let observed = Observed::of(batch, Beside::of(world));
+        let observed = Observed::of(batch, world.observation_layout());
         let rows: Vec<f32> = asked.iter().flat_map(|&env| observed.row(env).into_iter().take(self.n_values)).collect();
         let rows = PyArray1::from_vec(py, rows).reshape([asked.len(), self.n_values])?;
         let given = match self.begins {

@@ -17,7 +17,7 @@ use crate::arrays::aligned;
 use crate::errors::guarded;
 use crate::pool::Pool;
 use crate::worlds::{Asked, Given, Place};
-use crate::{actions, errors, geometry, observed};
+use crate::{actions, errors, geometry};
 use geometry::Points;
 use rows::{Rows, Seen, pose_of, telemetry_of};
 
@@ -96,12 +96,12 @@ impl Observer {
 
     #[getter]
     fn extras(&self) -> Vec<&'static str> {
-        observed::names(self.place.world.params.n_extras as usize)
+        self.place.world.observation_layout().extra_names()
     }
 
     #[getter]
     fn n_values(&self) -> usize {
-        rows::n_values(&self.place.world)
+        rows::layout(&self.place.world).n_values()
     }
 
     #[getter]
@@ -296,7 +296,7 @@ impl Observer {
             pool.run(py, || rows.observed(observers))?
         };
         let seen = seen.map_err(|error| errors::of_simulator(&error))?;
-        rows::arrays(py, &seen, self.n_values())
+        rows::arrays(py, &seen, rows::layout(&self.place.world))
     }
 }
 

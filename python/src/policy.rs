@@ -7,7 +7,7 @@ use std::path::Path;
 use std::sync::Mutex;
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
-use offtrack::layout::{EXTRAS, N_AROUND, N_EXTRAS, N_VALUES};
+use offtrack::layout::{N_AROUND, N_EXTRAS, N_VALUES, ObservationLayout};
 use offtrack_policy::{Error, Head, Policy};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -176,37 +176,23 @@ fn chosen<'py>(py: Python<'py>, policy: &Policy, outputs: Vec<f32>) -> PyResult<
 /// An array of observations, `[n, n_values]`: the 69 values and, where the policy observes them, extras and what is
 /// observed of other vehicles. A policy that names its values takes those of any benchmark that observes them.
 fn split(policy: &Policy, observations: &Bound<PyAny>) -> PyResult<Split> {
-    let least = match &policy.values {
-        None => policy.extras.len(),
-        Some(values) => {
-            let extras = values.indices().iter().filter(|&&index| index < N_VALUES + N_EXTRAS);
-            extras.map(|index| (index + 1).saturating_sub(N_VALUES)).max().unwrap_or_default()
-        }
-    };
-    let n_around = |has: bool| if has { N_AROUND } else { 0 };
-    let n_least = N_VALUES + least + n_around(policy.reads_vehicles());
+    let least = policy.observation_layout();
+    let n_least = least.n_values();
     let needed =
         || PyTypeError::new_err(format!("observations: a numpy array of float32 and shape (n, {n_least}) is needed"));
     let array: PyReadonlyArray2<f32> = observations.extract().map_err(|_| needed())?;
     let n_values = array.shape()[1];
-    // All extras together are fewer values than those of other vehicles.
-    let has_vehicles = N_VALUES + N_AROUND <= n_values;
-    let n_extras = n_values.saturating_sub(N_VALUES + n_around(has_vehicles));
-    let fits = match policy.values {
-        None => n_values == n_least,
-        Some(_) => {
-            (least..=N_EXTRAS).contains(&n_extras)
-                && N_VALUES + least <= n_values
-                && (has_vehicles || !policy.reads_vehicles())
-        }
+    let fits = |given: ObservationLayout| match policy.values {
+        None => given == least,
+        Some(_) => least.n_extras <= given.n_extras && least.has_vehicles <= given.has_vehicles,
     };
-    if !fits {
-        let extras = observed::described(EXTRAS[..least].iter().map(|extra| extra.name));
-        let around = if policy.reads_vehicles() { ", those of other vehicles last" } else { "" };
+    let Some(given) = ObservationLayout::of_width(n_values).filter(|&given| fits(given)) else {
+        let extras = observed::described(least.extras().iter().map(|extra| extra.name));
+        let around = if least.has_vehicles { ", those of other vehicles last" } else { "" };
         return Err(PyValueError::new_err(format!(
             "observations: {n_values} values each; {n_least} are needed{extras}{around}"
         )));
-    }
+    };
     let values = array.as_slice().map_err(|_| needed())?;
     if let Some(at) = values.iter().position(|value| !value.is_finite()) {
         let (row, column, value) = (at / n_values, at % n_values, values[at]);
@@ -217,10 +203,10 @@ fn split(policy: &Policy, observations: &Bound<PyAny>) -> PyResult<Split> {
     let mut split = Split::default();
     for row in values.chunks_exact(n_values) {
         let (values, beside) = row.split_at(N_VALUES);
-        let (extras, around) = beside.split_at(n_extras);
+        let (extras, around) = beside.split_at(given.n_extras);
         split.values.push(std::array::from_fn(|index| values[index]));
         split.extras.push(std::array::from_fn(|index| extras.get(index).copied().unwrap_or_default()));
-        if has_vehicles {
+        if given.has_vehicles {
             split.around.push(std::array::from_fn(|index| around[index]));
         }
     }

@@ -2,7 +2,7 @@
 //!
 //! A benchmark names a track, which observes the first so many of them.
 
-use super::N_EXTRAS;
+use super::{N_EXTRAS, ObservationLayout};
 
 /// A value that is observed beside the others.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,7 +59,7 @@ impl ObservedExtras {
 
     /// Names of the extras.
     pub fn names(self) -> Vec<&'static str> {
-        EXTRAS[..self.n_extras()].iter().map(|extra| extra.name).collect()
+        ObservationLayout { n_extras: self.n_extras(), has_vehicles: false }.extra_names()
     }
 }
 

@@ -271,7 +271,7 @@ fn a_benchmark_with_a_bad_key_of_traffic_is_refused_by_key_and_value() {
 #[test]
 fn what_is_observed_of_vehicles_is_a_column_of_values_in_their_ranges_that_a_reset_replaces() {
     let (scenario, world) = with_traffic("demand = [1500]\n[observation]\nvehicles = true\n");
-    assert!(world.observes_vehicles() && world.n_observed() == N_VALUES + N_AROUND);
+    assert!(world.observes_vehicles() && world.observation_layout().n_values() == N_VALUES + N_AROUND);
     let choice = RouteChoice::Drawn(scenario.split(Split::Train).to_vec());
     let mut simulator = Simulator::new(world, 64, 5, choice).unwrap();
     let lows: Vec<f32> = VEHICLE_VALUES.iter().flat_map(|group| std::iter::repeat_n(group.low, group.n)).collect();

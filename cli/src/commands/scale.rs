@@ -197,7 +197,7 @@ pub fn run(args: &Args) -> Result<(), Error> {
             dt: scenario.step,
             substeps: scenario.n_substeps,
             rays: N_RAYS,
-            values: world.n_observed(),
+            values: world.observation_layout().n_values(),
             holds: "physics, collision, progress, rays, observation, reward, and a new episode where one ended",
             rays_counted: "those of every step, and once more those after each reset",
             speeds: "medians over windows, nothing read back within one; stages are timed apart, each over the whole \

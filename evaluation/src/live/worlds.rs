@@ -4,7 +4,6 @@ use bytemuck::cast_slice;
 use offtrack::engine::Autoreset;
 use offtrack::engine::stages::{BEGIN, Case, Kernel, Stage};
 use offtrack::engine::tables::{Tables, levels};
-use offtrack::layout::EXTRAS;
 use offtrack::layout::buffers::Table;
 use offtrack::map::route::Route;
 use offtrack::world::World;
@@ -43,7 +42,7 @@ pub(super) fn printed(ground: &Ground, policies: &[&Policy], packed: &mut Packed
         "changes_speed": world.params.changes_speed == 1,
         "target_speeds": [world.params.target_speed_min, world.params.target_speed_max],
         "actions": world.actions.iter().map(|action| [action.steering, action.speed]).collect::<Vec<_>>(),
-        "extras": EXTRAS[..world.params.n_extras as usize].iter().map(|extra| extra.name).collect::<Vec<_>>(),
+        "extras": world.observation_layout().extra_names(),
         "disturbed": Case::of(world, Autoreset::SameStep).disturbed,
         "roads": roads.collect::<Vec<_>>(),
         "routes": routes

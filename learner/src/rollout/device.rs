@@ -13,13 +13,13 @@ use std::sync::Arc;
 use bytemuck::{bytes_of, cast_slice};
 use offtrack::gpu::{Columns as External, Device, Kernels, Slice};
 use offtrack::layout::random;
-use offtrack::layout::{Ended, N_VALUES};
+use offtrack::layout::{Ended, ObservationLayout};
 use offtrack::simulator::{Engine, RouteChoice, Simulator, Tally};
 use offtrack::world::World;
 use offtrack_policy::{LIMIT, Normalisation};
 use wgpu::{BindGroup, Buffer, CommandEncoder, PollType, SubmissionIndex};
 
-use super::{Episodes, Rollout, RouteEnd, n_around};
+use super::{Episodes, Rollout, RouteEnd};
 use crate::checkpoint::{Columns, Stored};
 use crate::config::{Config, Refinement};
 use crate::device::{Batch, Forward, NUMBER, Network};
@@ -110,7 +110,7 @@ impl<const N: usize> DeviceRollout<N> {
             n_slots: n_slots as u32,
             n_actions: world.params.n_actions,
             n_values: N as u32,
-            n_extras: (N - N_VALUES - n_around(N)) as u32,
+            n_extras: const { ObservationLayout::of_width(N).unwrap() }.n_extras as u32,
             n_rows: n_rows as u32,
             n_steps: config.learning.n_steps as u32,
             acting_seed: seeds.acting,

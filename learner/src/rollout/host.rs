@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use burn::tensor::Tensor;
 use offtrack::layout::random;
-use offtrack::layout::{Column, Ended, N_AROUND, N_EXTRAS, N_VALUES, RewardTerms};
+use offtrack::layout::{Column, Ended, N_AROUND, N_EXTRAS, N_VALUES, ObservationLayout, RewardTerms};
 use offtrack::physics;
 use offtrack::simulator::{Actions, RouteChoice, Simulator};
 use offtrack::world::World;
@@ -47,16 +47,10 @@ pub fn observed<'a, const N: usize>(
     if N == N_VALUES {
         return Cow::Borrowed(bytemuck::cast_slice(observation));
     }
-    let n_around = super::n_around(N);
+    let layout = const { ObservationLayout::of_width(N).unwrap() };
     let joined = |env: usize| {
         let mut row = [0.0; N];
-        let (values, beside) = row.split_at_mut(N_VALUES);
-        let (own, others) = beside.split_at_mut(N - N_VALUES - n_around);
-        values.copy_from_slice(&observation[env]);
-        own.copy_from_slice(&extras[env][..own.len()]);
-        if 0 < n_around {
-            others.copy_from_slice(&around[env]);
-        }
+        layout.join(&mut row, env, observation, extras, around);
         row
     };
     Cow::Owned((0..observation.len()).map(joined).collect())

@@ -2,7 +2,7 @@
 //! values may not be finite.
 
 use offtrack::layout::shared::Named;
-use offtrack::layout::{Action, EXTRAS, N_AROUND, N_VALUES};
+use offtrack::layout::{Action, EXTRAS, ObservationLayout};
 use safetensors::tensor::TensorView;
 
 use super::{Description, RecurrentDescription, floats, transposed};
@@ -36,8 +36,8 @@ pub(super) fn policy(name: &str, description: Description, tensors: Tensors) -> 
     let values = values(&description)?;
     let frames = frames(&description)?;
     let vehicles = description.vehicles.unwrap_or_default();
-    let n_beside = description.extras.len() + if vehicles { N_AROUND } else { 0 };
-    let n_values = values.as_ref().map_or(N_VALUES + n_beside, |values| values.indices().len());
+    let all = ObservationLayout { n_extras: description.extras.len(), has_vehicles: vehicles };
+    let n_values = values.as_ref().map_or(all.n_values(), |values| values.indices().len());
     let n_stacked = frames.n * n_values;
     let (statistics, layers) = tensors.split_at(2);
     check_statistics(statistics, n_values, frames)?;

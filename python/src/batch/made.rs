@@ -11,7 +11,7 @@ use super::state::State;
 use super::{Batch, weights};
 use crate::errors;
 use crate::infos::Names;
-use crate::observed::Beside;
+use crate::observed::columns_of_step;
 use crate::pool::Pool;
 use crate::worlds::{Asked, Place};
 
@@ -60,9 +60,9 @@ impl Batch {
             earlier: Tally::default(),
         };
         state.look()?;
-        let beside = Beside::of(&place.world);
-        let (names, read) = (Names::new(py, &place.world), beside.columns_of_step(autoreset));
-        Ok(Batch { place, names, n_envs, beside, read, device, autoreset, state: Mutex::new(state) })
+        let layout = place.world.observation_layout();
+        let (names, read) = (Names::new(py, &place.world), columns_of_step(layout, autoreset));
+        Ok(Batch { place, names, n_envs, layout, read, device, autoreset, state: Mutex::new(state) })
     }
 
     /// The state, unless another thread has it.

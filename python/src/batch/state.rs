@@ -45,7 +45,7 @@ impl State {
             simulator.step_any(actions)?;
             let read = Read::of(simulator, &batch.read)?;
             let (codes, trucks) = (read.rows::<u32>(Column::Ended), read.rows::<Truck>(Column::Truck));
-            let last = read.observed_last(batch.beside);
+            let last = read.observed_last(batch.layout);
             let mut rewards = read.rows::<f32>(Column::Reward);
             let mut codes = codes;
             if 1 < group {
@@ -67,7 +67,7 @@ impl State {
                 episodes[env] = Episode::of(&trucks[env]);
                 held[env] = trucks[env].held == 1;
             }
-            Ok(deliver(&read.observed(batch.beside), &rewards, &codes))
+            Ok(deliver(&read.observed(batch.layout), &rewards, &codes))
         })?;
         stepped.map_err(|error| errors::of_simulator(&error))
     }

@@ -1,8 +1,10 @@
 //! Poses, telemetry and observations of many trucks, as rows of arrays.
 
+use std::slice::from_ref;
+
 use numpy::ndarray::ArrayView1;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
-use offtrack::layout::N_VALUES;
+use offtrack::layout::ObservationLayout;
 use offtrack::observer::{Observed, Observer, Pose, Telemetry};
 use offtrack::simulator::Error;
 use offtrack::world::World;
@@ -76,9 +78,9 @@ pub(super) fn is_few(n_trucks: usize) -> bool {
     n_trucks <= 2 * ROWS_MIN
 }
 
-/// Values of an observation in a world, its extras among them.
-pub(super) fn n_values(world: &World) -> usize {
-    N_VALUES + world.params.n_extras as usize
+/// What an observer's observations consist of in a world: it sees no other vehicles.
+pub(super) fn layout(world: &World) -> ObservationLayout {
+    ObservationLayout { has_vehicles: false, ..world.observation_layout() }
 }
 
 /// Position, heading, trailer's heading, speed.
@@ -100,11 +102,11 @@ pub(super) fn telemetry_of(row: ArrayView1<f32>) -> Telemetry {
 }
 
 /// Observations as arrays.
-pub(super) fn arrays<'py>(py: Python<'py>, seen: &[Observed], n_values: usize) -> PyResult<Seen<'py>> {
-    let mut values = Vec::with_capacity(seen.len() * n_values);
-    for seen in seen {
-        values.extend_from_slice(&seen.values);
-        values.extend_from_slice(&seen.extras[..n_values - N_VALUES]);
+pub(super) fn arrays<'py>(py: Python<'py>, seen: &[Observed], layout: ObservationLayout) -> PyResult<Seen<'py>> {
+    let n_values = layout.n_values();
+    let mut values = vec![0.0; seen.len() * n_values];
+    for (row, seen) in values.chunks_exact_mut(n_values).zip(seen) {
+        layout.join(row, 0, from_ref(&seen.values), from_ref(&seen.extras), &[]);
     }
     let clearance: Vec<f32> = seen.iter().flat_map(|seen| [seen.clearance.tractor, seen.clearance.trailer]).collect();
     Ok((

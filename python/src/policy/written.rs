@@ -4,7 +4,7 @@ use std::path::Path;
 
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use offtrack::layout::shared::Named;
-use offtrack::layout::{Action, N_AROUND, N_VALUES};
+use offtrack::layout::{Action, ObservationLayout};
 use offtrack_policy::{
     Activation, Cell, FILE_LIMIT, Frames, Gates, Head, Layer, Normalisation, Padding, Policy, Recurrent, Selection,
     Squash,
@@ -77,8 +77,8 @@ impl Given<'_> {
         let values = self.values.as_ref().map(selected).transpose();
         let values = values.map_err(|message| PyValueError::new_err(format!("values: {message}")))?;
         let (extras, vehicles) = if values.is_none() { (&extras[..], vehicles) } else { (&[][..], false) };
-        let n_beside = extras.len() + if vehicles { N_AROUND } else { 0 };
-        let n_values = values.as_ref().map_or(N_VALUES + n_beside, |values| values.indices().len());
+        let all = ObservationLayout { n_extras: extras.len(), has_vehicles: vehicles };
+        let n_values = values.as_ref().map_or(all.n_values(), |values| values.indices().len());
         let n_stacked = n_values.saturating_mul(self.frames);
         self.check_shapes(n_stacked)?;
         let pair = |(input, hidden): &(Pair, Pair)| Ok(Cell { input: layer(input)?, hidden: layer(hidden)? });

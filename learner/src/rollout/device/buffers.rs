@@ -3,7 +3,7 @@
 
 use bytemuck::{bytes_of, cast_slice};
 use offtrack::gpu::{Device, Kernels, Slice};
-use offtrack::layout::Column;
+use offtrack::layout::{Column, ObservationLayout};
 use wgpu::BindGroup;
 
 use super::DeviceRollout;
@@ -63,9 +63,9 @@ impl<const N: usize> DeviceRollout<N> {
         let batch =
             self.simulator.on_device().ok_or_else(|| Error::Device("the simulator is not on a device".to_owned()))?;
         let column = |column: Column| batch.column(column).clone();
+        let layout = const { ObservationLayout::of_width(N).unwrap() };
         // Where they are not observed any buffer will do.
-        let of_vehicles =
-            |of: Column| if super::super::n_around(N) == 0 { empty(size_of::<f32>()) } else { column(of) };
+        let of_vehicles = |of: Column| if layout.has_vehicles { column(of) } else { empty(size_of::<f32>()) };
         let row_bytes = N * size_of::<f32>();
         let buffers = Buffers::new(vec![
             (Binding::facts, filled(bytes_of(&self.facts))),

@@ -3,7 +3,7 @@ use crate::device::least;
 use crate::network::Mlp;
 use crate::rollout::host::observed;
 use offtrack::layout::random::{index_below, signed_unit, words};
-use offtrack::layout::{Ended, N_AROUND, ObservedExtras};
+use offtrack::layout::{Ended, N_AROUND, N_VALUES, ObservedExtras};
 use offtrack::scenario::{Scenario, Split};
 use offtrack_policy::{Layer, Policy};
 use std::path::Path;
