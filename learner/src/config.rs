@@ -114,7 +114,7 @@ pub struct Exploration {
     pub spread: f64,
 }
 
-/// Routes are drawn more often where their episodes sometimes fail.
+/// Routes are drawn more often where their episodes fail more often.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LevelReplay {

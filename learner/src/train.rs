@@ -177,7 +177,6 @@ impl Training {
     fn run(&self, config: &Config, prepared: Prepared, opened: Opened, caller: Caller) -> Result<Outcome, Error> {
         let Prepared { backend, session, validation } = prepared;
         let Opened { folder, mut metrics, stored, has_new_budget } = opened;
-        let metrics_are_lost = metrics.is_new();
         if stored.is_none() {
             // It starts from the beginning: rows that were written before the first checkpoint come again.
             metrics.clear()?;
@@ -189,10 +188,6 @@ impl Training {
         run.validation = validation;
         let mut resumed = None;
         if let Some(stored) = stored {
-            if metrics_are_lost {
-                let file = shown_path(&folder.metrics());
-                caller.tell(Event::Warning(&format!("{file}: is missing: its rows begin again here")));
-            }
             // The earlier evaluation is of another policy as soon as there is a later one.
             let outdate = |run: &Run| {
                 files::write_json(&folder.report(), &Outcome { interrupted: true, ..Outcome::of(config, run) })?;
@@ -263,9 +258,10 @@ impl Training {
                 .write(&folder.page());
         }
         // Last of all: a run that has it is finished.
-        files::write_json(&folder.report(), &outcome)?;
+        let report = files::write_json(&folder.report(), &outcome);
+        // The evaluation is told also where it could not be written.
         caller.tell(Event::Finished { folder, outcome: &outcome });
-        // The evaluation is not lost where something else could not be written.
+        report?;
         written?;
         page?;
         Ok(outcome)

@@ -25,6 +25,7 @@ mod input;
 mod interruption;
 #[cfg(feature = "browser")]
 mod live;
+mod lost;
 mod memory;
 mod output;
 mod page;

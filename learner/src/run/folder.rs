@@ -138,6 +138,13 @@ pub(crate) fn is_plain(name: &str) -> bool {
         && (1..=LONGEST_NAME).contains(&name.len())
 }
 
+/// A name that a run's folder may have, also with a number behind it, as near to another as can be.
+fn plain(name: &str) -> String {
+    let plain = |c: char| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '-' };
+    let name: String = name.trim_start_matches('.').chars().map(plain).take(LONGEST_NAME - 11).collect();
+    if name.is_empty() { "run".to_owned() } else { name }
+}
+
 fn named(runs: &Path, name: &str) -> Result<PathBuf, Error> {
     if !is_plain(name) {
         let expected =
@@ -156,7 +163,7 @@ fn named(runs: &Path, name: &str) -> Result<PathBuf, Error> {
 }
 
 fn numbered(runs: &Path, config_file: &Path) -> Result<PathBuf, Error> {
-    let stem = config_file.file_stem().map_or_else(|| "run".into(), |stem| stem.to_string_lossy());
+    let stem = plain(&config_file.file_stem().unwrap_or_default().to_string_lossy());
     let mut number = 1u32;
     loop {
         let path = runs.join(format!("{stem}-{number}"));

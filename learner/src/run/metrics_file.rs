@@ -1,7 +1,7 @@
 //! `metrics.csv`: whole rows only, even on a full disk, and cut back to where a checkpoint was.
 
 use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{BufRead, BufReader, Write};
+use std::io::{BufRead, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -21,15 +21,13 @@ pub struct MetricsFile {
     file: File,
     /// Bytes of whole rows.
     length: u64,
-    /// It was not there before.
-    is_new: bool,
 }
 
 impl MetricsFile {
     /// A new file with the names of its columns.
     pub fn create(path: PathBuf) -> Result<MetricsFile, Error> {
         let file = OpenOptions::new().append(true).create_new(true).open(&path).map_err(Error::write(&path))?;
-        let mut metrics_file = MetricsFile { path, file, length: 0, is_new: true };
+        let mut metrics_file = MetricsFile { path, file, length: 0 };
         metrics_file.lock()?;
         metrics_file.append(HEAD)?;
         Ok(metrics_file)
@@ -43,7 +41,7 @@ impl MetricsFile {
             Ok(_) => Error::write(&path)(error),
             Err(_) => Error::read(&path)(error),
         })?;
-        let mut metrics_file = MetricsFile { length: 0, path, file, is_new: false };
+        let mut metrics_file = MetricsFile { length: 0, path, file };
         metrics_file.lock()?;
         // A run that was still ending may have written rows until its lock was let go.
         metrics_file.length = metrics_file.file.metadata().map_err(Error::read(&metrics_file.path))?.len();
@@ -81,11 +79,6 @@ impl MetricsFile {
         &self.path
     }
 
-    /// Whether it was not there before.
-    pub fn is_new(&self) -> bool {
-        self.is_new
-    }
-
     /// Bytes of whole rows.
     pub fn length(&self) -> u64 {
         self.length
@@ -105,17 +98,34 @@ impl MetricsFile {
 
     /// Removes all rows.
     pub fn clear(&mut self) -> Result<(), Error> {
-        self.cut(HEAD.len() as u64)
+        self.shorten(HEAD.len() as u64)
     }
 
-    /// Removes the rows after the first `length` bytes. A new file has no row.
-    pub fn cut(&mut self, length: u64) -> Result<(), Error> {
-        let length = if self.is_new { HEAD.len() as u64 } else { length };
-        if self.length < length {
+    /// Removes the rows after the first `length` bytes, where a row must end; whether all before are there. A file
+    /// without any row stays as it is: it was missing, and is begun again.
+    pub fn cut(&mut self, length: u64) -> Result<bool, Error> {
+        if self.length == HEAD.len() as u64 {
+            return Ok(self.length == length);
+        }
+        let Some(last) = length.checked_sub(1).filter(|_| length <= self.length) else {
             let message =
                 format!("has {} bytes where its checkpoint expects {length}: put the whole file back", self.length);
             return Err(Error::contents(&self.path, message));
+        };
+        let mut byte = [0];
+        let mut file = &self.file;
+        file.seek(SeekFrom::Start(last)).and_then(|_| file.read_exact(&mut byte)).map_err(Error::read(&self.path))?;
+        if byte != *b"\n" {
+            let message = format!(
+                "has no end of a row at byte {length}, where its checkpoint expects one: put the file back as it was"
+            );
+            return Err(Error::contents(&self.path, message));
         }
+        self.shorten(length)?;
+        Ok(true)
+    }
+
+    fn shorten(&mut self, length: u64) -> Result<(), Error> {
         self.file.set_len(length).map_err(Error::write(&self.path))?;
         self.length = length;
         Ok(())

@@ -4,6 +4,8 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use offtrack::files::reader::shown_path;
+
 use super::events_file::EventsFile;
 use super::metrics_file::{HEAD, MetricsFile};
 use super::window::Window;
@@ -251,7 +253,10 @@ impl<'a> Progress<'a> {
 
     /// Writes the last row, of what is in no row yet, and closes the display.
     pub fn finish(&mut self, entropy_coefficient: f32) -> Result<(), Error> {
-        self.show();
+        // What was shown just now has no rates to show again.
+        if self.shown.1 < self.env_steps {
+            self.show();
+        }
         self.display.close();
         if self.row_steps < self.env_steps { self.append_row(entropy_coefficient) } else { Ok(()) }
     }
@@ -356,7 +361,11 @@ impl<'a> Progress<'a> {
         (self.before, self.begun, self.row_seconds) = (before, Instant::now(), row_seconds);
         self.tried = (seconds, self.row_steps);
         self.shown = (Instant::now(), self.env_steps, self.updates);
-        self.metrics.cut(length)
+        if !self.metrics.cut(length)? {
+            let file = shown_path(self.metrics.path());
+            self.display.warn(format!("{file}: was missing: its rows begin again here"));
+        }
+        Ok(())
     }
 }
 

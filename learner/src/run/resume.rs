@@ -37,8 +37,9 @@ impl Resumed {
         let folder = Folder::of(path)?;
         let has_new_budget = minutes.is_some() || steps.is_some();
         let mut config = Config::read(&folder.config())?;
-        // A report is written after the first checkpoint, when the run ends or is stopped.
-        if !folder.checkpoint().is_file() && folder.report().is_file() {
+        // Policy and report are written after the first checkpoint.
+        let had_checkpoint = folder.report().is_file() || folder.policy().is_file();
+        if !folder.checkpoint().is_file() && had_checkpoint {
             let ended = if is_evaluated(&folder) { "has finished" } else { "was stopped" };
             let has_frames = config.refinement.as_ref().is_some_and(|refinement| 1 < refinement.frames);
             // A run begins with the policy of one observation alone.
