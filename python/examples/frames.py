@@ -1,11 +1,11 @@
-"""Draws four pictures of ``render_mode="rgb_array"`` side by side: ``python frames.py frames.png``; needs pillow.
+"""Draws four pictures of ``render_mode="rgb_array"`` side by side: ``python frames.py -o frames.png``; needs pillow.
 
 Three of the shipped policy on roundabouts that it has never seen, and one of a truck that holds its steer angle.
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
 
 import numpy as np
 from PIL import Image
@@ -36,4 +36,6 @@ def main(file: str) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    parser = argparse.ArgumentParser(description="Draws four pictures side by side")
+    parser.add_argument("-o", "--output", required=True, metavar="FILE", help="a picture, as frames.png")
+    main(parser.parse_args().output)

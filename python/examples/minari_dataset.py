@@ -2,9 +2,9 @@
 
     python minari_dataset.py --policy attard2023 --episodes 20
 
-Needs ``offtrack-sim``, ``minari[arrow]`` and ``pillow``. The data set, ``offtrack/attard2023-attard2023-v0``, lies
-where Minari keeps its own (``MINARI_DATASETS_PATH``): observations float32 ``[steps + 1, n_values]``, actions, rewards
-and both flags ``[steps]``, and of each episode its route and why it ended. The trucks are stepped together, on routes
+Needs ``offtrack-sim``, ``minari[arrow]`` and ``pillow``. The data set, ``offtrack/attard2023-attard2023-v0`` or
+``--name``, lies where Minari keeps its own (``MINARI_DATASETS_PATH``), and none is overwritten: observations float32
+``[steps + 1, n_values]``, actions, rewards and both flags ``[steps]``, and of each episode its route and why it ended. The trucks are stepped together, on routes
 and from starts that are drawn; what is written of each is its first ``--episodes`` episodes, so that short ones, which
 are failures more often, are not drawn more often.
 """
@@ -18,6 +18,7 @@ import gymnasium
 import minari
 import numpy as np
 from minari.data_collector import EpisodeBuffer
+from minari.storage import get_dataset_path
 
 import offtrack_sim
 from offtrack_sim.single import action_space, observation_space
@@ -65,18 +66,23 @@ def main() -> None:
     parser.add_argument("--trucks", type=int, default=64, help="trucks that are stepped together")
     parser.add_argument("--episodes", type=int, default=4, help="episodes of each truck")
     parser.add_argument("--seed", type=int, default=0, help="seed of routes and starts")
+    parser.add_argument("--name", help="the data set's name (default: those of benchmark and policy)")
     args = parser.parse_args()
     is_file = args.policy.endswith(".safetensors")
     policy = offtrack_sim.Policy.load(args.policy) if is_file else offtrack_sim.Policy.shipped(args.policy)
     batch = offtrack_sim.Batch(args.benchmark, args.trucks, split=args.split, seed=args.seed)
-    episodes = driven(policy, batch, args.episodes)
     name = args.policy.rsplit("/", 1)[-1].removesuffix(".safetensors")
+    dataset_id = f"offtrack/{args.name or f'{batch.scenario}-{name}'}-v0"
+    folder = get_dataset_path(dataset_id)
+    if folder.exists():
+        parser.error(f"--name: {dataset_id}; {folder} exists and is never overwritten: choose another, or remove it")
+    episodes = driven(policy, batch, args.episodes)
     spec = copy.deepcopy(gymnasium.spec("offtrack/Roundabout-v0"))
     spec.kwargs |= {"scenario": args.benchmark, "split": args.split}
     evaluated = copy.deepcopy(spec)
     evaluated.kwargs |= {"split": "test"}
     dataset = minari.create_dataset_from_buffers(
-        f"offtrack/{batch.scenario}-{name}-v0",
+        dataset_id,
         episodes,
         env=spec,
         eval_env=evaluated,

@@ -43,8 +43,10 @@ def file_name(file: str | os.PathLike[str], name: str = "file") -> str:
 
 
 def checked_integer(name: str, value: int) -> int:
-    """The value as an integer, if it is one."""
+    """The value as an integer, if it is one: True and False are none, of which a list would be a mask."""
     try:
+        if isinstance(value, bool | np.bool_):
+            raise TypeError
         return operator.index(value)
     except TypeError:
         raise TypeError(f"{name}: {value!r}; an integer is needed") from None
@@ -204,7 +206,7 @@ def weights_of(weights: Mapping[str, float]) -> list[tuple[str, float]]:
         raise TypeError(f"weights: {weights!r}; a dict of numbers by name of route or roundabout is needed")
     pairs = []
     for name, weight in weights.items():
-        if not isinstance(weight, int | float | np.integer | np.floating):
+        if isinstance(weight, bool) or not isinstance(weight, int | float | np.integer | np.floating):
             raise TypeError(f"weights[{name!r}]: {weight!r}; a number is needed")
         try:
             pairs.append((text("weights", name), float(weight)))

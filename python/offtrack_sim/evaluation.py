@@ -43,7 +43,8 @@ class Evaluation:
     - ``reward``, and what the reward weighs, each summed over the steps: ``term_waypoints``, waypoints passed;
       ``term_lane_distance``, distances as fractions of their limit; ``term_clearance``, depths in the margin kept from
       kerbs, 0..1; ``term_failure``, 1 for a failure;
-    - ``lane_distance_mean``, ``lane_distance_max`` [m]; ``outside_lane``, a fraction of the steps;
+    - ``lane_distance_mean``, ``lane_distance_max`` [m]; ``outside_lane``, a fraction of the steps
+      (``outside_lane_mean`` of a JSON report is that of episodes that arrived);
     - ``tractor_clearance_min``, ``trailer_clearance_min`` [m], negative beyond a kerb;
     - ``load_transfer_ratio_peak``, 1 where wheels lift; ``articulation_peak`` [rad]; ``off_tracking_peak`` [m];
     - ``on_apron``, furthest that a wheel of the trailer was on an apron [m], 0 on a road without one.

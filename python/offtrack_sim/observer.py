@@ -77,6 +77,8 @@ class Observer(_offtrack.Observer):
         n_values: Number of an observation's values, extras included.
         classes: Names of vehicle and load of each class of the benchmark.
 
+    It observes no other vehicles: a policy that reads what they do cannot drive by it.
+
     Copies and pickles go on from where the original is, independent of it. One thread at a time may use it.
 
     Raises:
@@ -343,6 +345,10 @@ def _vehicles(given: Sequence[tuple[str, str]] | Indices | None) -> tuple[list[A
             if len(pair) != 2 or not all(isinstance(name, str) for name in pair):
                 raise TypeError(f"vehicles[{index}]: {pair!r}; names of vehicle and load are needed")
         return pairs, None
+    for index, vehicle in enumerate(given):
+        if isinstance(vehicle, str):
+            needed = "a pair of names of vehicle and load, or an index, is needed"
+            raise TypeError(f"vehicles[{index}]: {vehicle!r}; {needed}")
     rows = [checked_integer(f"vehicles[{index}]", vehicle) for index, vehicle in enumerate(given)]
     return None, [within(f"vehicles[{index}]", row, 0, 2**32) for index, row in enumerate(rows)]
 

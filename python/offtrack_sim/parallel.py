@@ -167,13 +167,15 @@ class RoundaboutParallel(ParallelEnv[str, Observation, Any]):
         )
 
     def _checked(self, agent: str, action: Any) -> npt.NDArray[Any]:
-        """An agent's action, of the kind that its space has; the batch checks what lies in it."""
+        """An agent's action, if its space has it."""
         space = self.action_spaces[agent]
         found = numbers(f"actions[{agent!r}]", action, f"one of {space} is needed")
         kinds = "f" if isinstance(space, gymnasium.spaces.Box) else "iu"
         if found.dtype.kind not in kinds or found.shape != (space.shape or ()):
             raise TypeError(f"actions[{agent!r}]: {action!r}; one of {space} is needed")
-        if kinds == "f":
+        if isinstance(space, gymnasium.spaces.Discrete):
+            within(f"actions[{agent!r}]", found.item(), 0, int(space.n))
+        else:
             check_commands(f"actions[{agent!r}]", found)
         return found
 

@@ -114,6 +114,11 @@ def test_a_state_that_cannot_be_is_not_restored(change: Callable[[Any], None], m
     assert all(before[name].tobytes() == column.tobytes() for name, column in batch.state().items())
 
 
+def step_into_one_array_of_flags() -> None:
+    flags = np.zeros(2, bool)
+    batch_of_two().step_into(np.full(2, 4), np.zeros((2, 69), np.float32), np.zeros(2, np.float32), flags, flags)
+
+
 def batch_of_two() -> Any:
     return Batch(num_envs=2)
 
@@ -175,6 +180,10 @@ def begun() -> Any:
         (lambda: sim.evaluate(sim.Policy.shipped(), seed=1.5), "seed"),
         (lambda: sim.make_vec(num_envs=1.5), "num_envs"),
         (lambda: sim.make_vec(seed="x"), "seed"),
+        (lambda: sim.Batch(seed=True), "seed"),
+        (lambda: sim.Batch(weights={"16m": True}), r"weights\['16m'\]"),
+        (lambda: batch_of_two().begin([False, True]), r"envs\[0\]"),
+        (lambda: sim.Observer("laden2026", ["16m/N-left-3"], ("daf_xf", "laden")), r"vehicles\[0\]"),
         (lambda: sim.make_vec().reset(seed=1.5), "seed"),
         (lambda: sim.make_vec().reset(seed="5"), "seed"),
         (lambda: sim.make_vec().reset(seed=[1.5]), "seed"),
@@ -195,6 +204,7 @@ def test_a_value_of_a_wrong_type_is_refused_by_the_arguments_name(call: Callable
         (lambda: batch_of_two().begin([0, 0], seeds=[1, 2]), "envs: 0 stands twice"),
         (lambda: batch_of_two().begin([1], starts=[sim.Start(10**400)]), r"starts\[1\].offset: too large for a float"),
         (lambda: batch_of_two().begin(starts=[None, (0, -(10**5000))]), r"starts\[1\].heading: too large .* -1..1$"),
+        (lambda: step_into_one_array_of_flags(), "truncated: shares memory with another array"),
         (lambda: sim.Batch(device=""), 'device: \'\'; "cpu", "gpu" or'),
         (lambda: sim.Batch("\ud800"), "scenario: .* is no UTF-8"),
         (lambda: sim.Batch(routes=["\ud800"]), "routes: .* is no UTF-8"),

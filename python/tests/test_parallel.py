@@ -106,7 +106,7 @@ def test_routes_are_stated_for_all_trucks() -> None:
     stated = ["20m/N-left-2", "20m/E-right-1"]
     _, infos = env.reset(seed=1, options={"routes": stated})
     assert [infos[agent]["route"] for agent in env.agents] == stated
-    with pytest.raises(ValueError, match="1 lanes of one road"):
+    with pytest.raises(ValueError, match="begin in one lane; each needs its own"):
         env.reset(options={"routes": ["20m/N-left-2", "20m/N-left-4"]})
     with pytest.raises(ValueError, match="routes"):
         env.reset(options={"routes": ["20m/N-left-2"]})
@@ -120,7 +120,7 @@ def test_routes_are_stated_for_all_trucks() -> None:
     ("arguments", "error", "message"),
     [
         ({"n_trucks": 9}, ValueError, "n_trucks: 9"),
-        ({"n_trucks": 8, "routes": ["20m/N-left-2", "20m/N-right-1"]}, ValueError, "2 lanes of 20m"),
+        ({"n_trucks": 8, "routes": ["20m/N-left-2", "20m/N-right-1"]}, ValueError, "begin in 2 of the lanes of 20m"),
         ({"scenario": "attard2023"}, ValueError, "scenario: attard2023; .*with a table .traffic. is needed"),
         ({"render_mode": "human"}, ValueError, "render_mode: 'human'"),
     ],
@@ -137,7 +137,7 @@ def test_an_action_that_is_missing_or_none_is_named() -> None:
         env.step({"truck_0": 3})
     with pytest.raises(TypeError, match="truck_1.*0.5"):
         env.step({"truck_0": 3, "truck_1": 0.5})
-    with pytest.raises(ValueError, match="36"):
+    with pytest.raises(ValueError, match=r"^actions\['truck_1'\]: 36; must lie in 0..35$"):
         env.step({"truck_0": 3, "truck_1": 36})
     with pytest.raises(TypeError, match="actions: None; a dict of an action for each agent"):
         env.step(None)  # type: ignore[arg-type]

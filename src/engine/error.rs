@@ -20,17 +20,35 @@ pub enum Error {
         /// Trucks of a group.
         group: usize,
     },
-    /// Trucks of a group begin in lanes of their own on one road.
+    /// A group of trucks is drawn on a road where each begins in a lane of its own.
     #[error(
-        "routes: {n_lanes} lanes of {road} where trucks begin; a group of {group} trucks (traffic.group) needs as many"
+        "routes: they begin in {n_lanes} of the lanes of {road}; a group of {group} trucks (traffic.group) needs as many"
     )]
     NarrowGroup {
-        /// A road, or the trucks whose routes these are.
+        /// The road.
         road: String,
         /// Lanes in which these routes begin.
         n_lanes: usize,
         /// Trucks of a group.
         group: usize,
+    },
+    /// Trucks of a group begin in lanes of their own.
+    #[error("routes: trucks {first} and {other} of a group (traffic.group) begin in one lane; each needs its own")]
+    SharedLane {
+        /// The first truck that begins in the lane.
+        first: usize,
+        /// The next one.
+        other: usize,
+    },
+    /// Trucks of a group begin on one road.
+    #[error("routes: trucks {first} and {other} of a group (traffic.group) are on {roads:?}; a group shares one road")]
+    SplitRoads {
+        /// The group's first truck.
+        first: usize,
+        /// The first one that is on another road.
+        other: usize,
+        /// Names of their roads.
+        roads: [String; 2],
     },
     /// Trucks of a group begin together.
     #[error(

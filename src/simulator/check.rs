@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::engine::group::{exceed_arms, n_lanes};
+use crate::engine::group::{begins_in, exceed_arms, n_lanes};
 use crate::engine::{Error, RouteChoice};
 use crate::layout::{BEGINS, BeginRow, HAS_ROUTE, IS_CENTRED, IS_FIRST, Start};
 use crate::world::World;
@@ -44,7 +44,7 @@ pub(super) fn check_drawn(world: &World, routes: &[u32]) -> Result<(), Error> {
         on_roads.entry(world.routes[route as usize].roundabout).or_default().push(route);
     }
     for routes in on_roads.into_values() {
-        let name = world.route_names[routes[0] as usize].rsplit_once('/').map_or("the road", |(road, _)| road);
+        let name = road_name(world, routes[0]);
         let n_lanes = n_lanes(world, routes);
         if n_lanes < group {
             return Err(Error::NarrowGroup { road: name.to_owned(), n_lanes, group });
@@ -55,15 +55,23 @@ pub(super) fn check_drawn(world: &World, routes: &[u32]) -> Result<(), Error> {
 
 /// An error if the routes of a group's trucks, the first of which is `env`, are not on one road or begin in one lane.
 pub(super) fn check_group(world: &World, env: usize, routes: &[u32]) -> Result<(), Error> {
-    let group = routes.len();
     let road = |route: u32| world.routes[route as usize].roundabout;
-    let on_road = routes.iter().copied().filter(|&route| road(route) == road(routes[0]));
-    let n_lanes = n_lanes(world, on_road);
-    if n_lanes == group {
-        Ok(())
-    } else {
-        Err(Error::NarrowGroup { road: format!("one road for trucks {env}..{}", env + group - 1), n_lanes, group })
+    if let Some(other) = routes.iter().position(|&route| road(route) != road(routes[0])) {
+        let roads = [routes[0], routes[other]].map(|route| road_name(world, route).to_owned());
+        return Err(Error::SplitRoads { first: env, other: env + other, roads });
     }
+    for (other, &route) in routes.iter().enumerate() {
+        let lane = begins_in(world, route);
+        if let Some(first) = routes[..other].iter().position(|&before| begins_in(world, before) == lane) {
+            return Err(Error::SharedLane { first: env + first, other: env + other });
+        }
+    }
+    Ok(())
+}
+
+/// The name of a route's road.
+fn road_name(world: &World, route: u32) -> &str {
+    world.route_names[route as usize].rsplit_once('/').map_or("the road", |(road, _)| road)
 }
 
 /// An error if some trucks of a group begin an episode and others do not, or on routes that do not go together.

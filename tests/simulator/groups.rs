@@ -308,10 +308,10 @@ fn trucks_of_a_group_are_begun_together_and_on_routes_that_go_together() {
     let begin = |env: usize, route: Option<u32>| Begin { env, route, ..Begin::default() };
     let error = simulator.begin(&[begin(1, None)]).unwrap_err();
     assert_eq!(error, Error::PartOfGroup { env: 0, group: 2 });
-    let message = simulator.begin(&[begin(0, of("20m/N-left-2")), begin(1, of("20m/N-left-4"))]).unwrap_err();
-    assert!(message.to_string().contains("1 lanes of one road for trucks 0..1"), "{message}");
-    let message = simulator.begin(&[begin(0, of("20m/N-left-2")), begin(1, of("40m/E-left-1"))]).unwrap_err();
-    assert!(matches!(message, Error::NarrowGroup { .. }), "{message}");
+    let error = simulator.begin(&[begin(0, of("20m/N-left-2")), begin(1, of("20m/N-left-4"))]).unwrap_err();
+    assert_eq!(error, Error::SharedLane { first: 0, other: 1 });
+    let error = simulator.begin(&[begin(0, of("20m/N-left-2")), begin(1, of("40m/E-left-1"))]).unwrap_err();
+    assert_eq!(error, Error::SplitRoads { first: 0, other: 1, roads: ["20m", "40m"].map(str::to_owned) });
     simulator.begin(&[begin(0, of("20m/N-right-2")), begin(1, of("20m/N-left-4"))]).unwrap();
     assert_eq!(simulator.batch().truck[1].route, of("20m/N-left-4").unwrap());
 }
@@ -347,7 +347,10 @@ fn what_groups_cannot_do_is_refused_by_what_would_do() {
     assert_eq!(new(6, drawn(&scenario)), Error::SplitGroup { n_envs: 6, group: 4 });
     let of_one_arm = world.route_names.iter().enumerate().filter(|(_, name)| name.starts_with("20m/N"));
     let message = new(4, RouteChoice::Drawn(of_one_arm.map(|(route, _)| route as u32).collect())).to_string();
-    assert!(message.contains("2 lanes of 20m") && message.contains("a group of 4 trucks"), "{message}");
+    assert!(
+        message.contains("begin in 2 of the lanes of 20m;") && message.contains("a group of 4 trucks"),
+        "{message}"
+    );
     let mut simulator = Simulator::new(world.clone(), 4, 1, drawn(&scenario)).unwrap();
     assert_eq!(simulator.gather(&[0, 0]).unwrap_err(), Error::NotInGroups { what: "gather", group: 4 });
     let parsed = |old: &str, new: &str| {

@@ -1,6 +1,6 @@
 //! What Python gives a batch by name, and arrays that it fills.
 
-use numpy::{Element, PyReadwriteArray1, PyUntypedArrayMethods};
+use numpy::{BorrowError, Element, PyArray1, PyArrayMethods, PyReadwriteArray1, PyUntypedArrayMethods};
 use offtrack::layout::Column;
 use offtrack::layout::shared::Named;
 use offtrack::simulator::{Autoreset, Engine};
@@ -60,7 +60,13 @@ pub(super) fn writable<'py, T: Element>(
     n_envs: usize,
 ) -> PyResult<PyReadwriteArray1<'py, T>> {
     let shape = format!("{kind} of shape ({n_envs},)");
-    let array: PyReadwriteArray1<T> = array.extract().map_err(|_| unfit(name, &shape))?;
+    let array = array.cast::<PyArray1<T>>().map_err(|_| unfit(name, &shape))?;
+    let array = array.try_readwrite().map_err(|error| match error {
+        BorrowError::AlreadyBorrowed => {
+            PyValueError::new_err(format!("{name}: shares memory with another array of the call; each needs its own"))
+        }
+        _ => unfit(name, &shape),
+    })?;
     if array.len() == n_envs { Ok(array) } else { Err(unfit(name, &shape)) }
 }
 
