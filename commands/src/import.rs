@@ -327,6 +327,10 @@ fn check(file: &Path, map: &Map, choice: &Choice) -> Result<(), Error> {
     } else {
         map.rings().iter().map(|ring| map.ground(ring, &Options { arms: choice.arms.clone() })).collect()
     };
+    // A ring below a bridge is not found.
+    for bridge in if places.is_empty() { map.bridges() } else { Vec::new() } {
+        let _ = writeln!(text, "{bridge}");
+    }
     for place in &places {
         match place {
             // What is said of the map's roads is said above.

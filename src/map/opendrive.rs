@@ -42,7 +42,7 @@ pub use export::exported;
 use graph::Graph;
 pub use junction::{Junction, RoadLane, Way};
 use lanes::Strip;
-use records::Records;
+use records::{Concerns, Records, Warning};
 pub use rings::{Refused, Ring};
 
 /// Which hand of traffic a map has.
@@ -101,13 +101,17 @@ impl Map {
     ///
     /// The errors of [`Map::read`] but for files that cannot be read.
     pub fn parse(file: &Path, text: &str, hand: Hand) -> Result<Map, Error> {
-        let records = read::records(file, text, hand)?;
+        let mut records = read::records(file, text, hand)?;
+        let against = records.against_hand();
+        records.warnings.extend(against.map(|text| Warning { concerns: Concerns::EveryPlace, text }));
         let strips = lanes::strips(&records, COARSE).map_err(|_| {
             let expected = "must be fewer: cut the map down to the roads around the roundabout";
             Reader::of(file).invalid("road", "more than 2000 km or 10 million points of lanes", expected)
         })?;
         let graph = Graph::new(&records, &strips);
-        let (rings, refused) = rings::rings(&strips, &graph);
+        let islands: Vec<Vec<DVec2>> =
+            records.roads.iter().flat_map(|road| &road.islands).map(|island| island.corners.clone()).collect();
+        let (rings, refused) = rings::rings(&strips, &islands, &graph);
         Ok(Map { file: file.to_owned(), records, strips, graph, rings, refused })
     }
 
@@ -123,8 +127,12 @@ impl Map {
 
     /// What is odd in the file, and what was done about it.
     pub fn warnings(&self) -> impl Iterator<Item = &str> {
-        let of_file = self.records.warnings.iter().map(|warning| warning.text.as_str());
-        of_file.chain(self.graph.warnings.iter().map(String::as_str))
+        self.records.warnings.iter().chain(&self.graph.warnings).map(|warning| warning.text.as_str())
+    }
+
+    /// Which roads pass above others, and how far: a level map paves both.
+    pub fn bridges(&self) -> Vec<String> {
+        bridges::bridges(&self.records, self.strips.iter().filter(|strip| strip.is_driven()))
     }
 
     /// By what its header moves the map, x, y and z (m), then a turn (rad), where that is not nothing. It is not done:
@@ -153,10 +161,14 @@ impl Map {
         let nearest = self.rings().into_iter().min_by(|one, other| distance(one).total_cmp(&distance(other)));
         nearest.ok_or_else(|| {
             let (roads, holes) = (self.n_roads(), self.refused.len());
-            let expected = format!(
+            let mut expected = format!(
                 "no roundabout here: {roads} roads around {holes} islands and blocks, none of them a circle \
                          with one-way traffic around it: `--check` says what each lacks"
             );
+            // One that a road passes above is paved over.
+            if let Some(bridge) = self.bridges().first() {
+                expected += &format!("; {bridge}: a map without that road would do");
+            }
             Reader::of(&self.file).invalid("ring", format_args!("({:.1}, {:.1})", p.x, p.y), expected)
         })
     }

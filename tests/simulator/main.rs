@@ -30,6 +30,7 @@ mod machine_code;
 mod map_bypass;
 mod map_drawing;
 mod map_export;
+mod map_gaps;
 mod map_junctions;
 mod map_kinds;
 mod map_lanes;

@@ -4,10 +4,8 @@ use std::collections::BTreeMap;
 
 use glam::DVec2;
 
-use super::Map;
 use super::lanes::Strip;
-use super::paths::Network;
-use super::records::RoadRecord;
+use super::records::{Records, RoadRecord};
 use super::whole::LEVEL;
 use super::xml::shown;
 use crate::geometry::area::encloses;
@@ -62,14 +60,14 @@ impl Raised {
     }
 }
 
-/// What passes above something else around a place, by the lanes there: for each such road the most that it does.
-pub(super) fn bridges(map: &Map, network: &Network) -> Vec<String> {
-    let roads = &map.records.roads;
+/// What passes above something else, of some lanes: for each such road the most that it does.
+pub(super) fn bridges<'a>(records: &Records, strips: impl Iterator<Item = &'a Strip>) -> Vec<String> {
+    let roads = &records.roads;
     // A map without heights has no bridges.
     if roads.iter().all(|road| road.level.elevation.is_empty()) {
         return Vec::new();
     }
-    let lanes: Vec<Raised> = network.strips.values().map(|strip| Raised::new(&roads[strip.road], strip)).collect();
+    let lanes: Vec<Raised> = strips.map(|strip| Raised::new(&roads[strip.road], strip)).collect();
     let mut above: BTreeMap<&str, (f64, &str)> = BTreeMap::new();
     for one in &lanes {
         for other in &lanes {

@@ -171,9 +171,11 @@ impl Site<'_> {
                 "{place}: the header's offset ({x}, {y}, {z}) m, {turn} rad is not applied: coordinates are the file's"
             )
         }));
-        let uneven = tilt(map, network).into_iter().chain(bridges(map, network));
+        let uneven = tilt(map, network).into_iter().chain(bridges(&map.records, network.strips.values().copied()));
         routes.warnings.extend(uneven.map(|what| format!("{}: {what}", refused.place)));
-        routes.warnings.extend(map.records.warnings_around(network).map(str::to_owned));
+        for warnings in [&map.records.warnings, &map.graph.warnings] {
+            routes.warnings.extend(map.records.around(warnings, network).map(str::to_owned));
+        }
         let Lines { mut lines, warnings, .. } = routes;
         lines.sort_by_key(|line| (line.entry, line.lane == Lane::Right, line.exit));
         let kerbs = faces.loops.iter().map(|curve| kerb_of(curve, &arms)).collect();
@@ -328,8 +330,10 @@ fn drop_passing_lanes(crossings: &mut Vec<Crossing>, network: &Network, reach: f
     };
     let lanes: Vec<ArmLanes> = crossings.iter().map(alone).collect();
     let mut used = vec![false; lanes.len()];
+    let mut is_linked = used.clone();
     for (entry, crossing) in crossings.iter().enumerate().filter(|(_, crossing)| crossing.inwards) {
         for ((exit, _), way) in network.ways(crossing, &lanes) {
+            (is_linked[entry], is_linked[exit]) = (true, true);
             if network.nearest_to_centre(&way) < reach {
                 (used[entry], used[exit]) = (true, true);
             }
@@ -339,13 +343,18 @@ fn drop_passing_lanes(crossings: &mut Vec<Crossing>, network: &Network, reach: f
         crossing.strips.iter().filter_map(|strip| Some(network.strips.get(strip)?.road)).collect()
     };
     let (kept, dropped): (Vec<_>, Vec<_>) =
-        std::mem::take(crossings).into_iter().zip(used).partition(|(_, used)| *used);
-    *crossings = kept.into_iter().map(|(crossing, _)| crossing).collect();
+        std::mem::take(crossings).into_iter().zip(is_linked).zip(used).partition(|(_, used)| *used);
+    *crossings = kept.into_iter().map(|((crossing, _), _)| crossing).collect();
     let of_ring: Vec<usize> = crossings.iter().flat_map(roads).collect();
-    let dropped = dropped.iter().filter(|(crossing, _)| roads(crossing).iter().any(|road| of_ring.contains(road)));
-    let told = |(crossing, _): &(Crossing, bool)| {
+    let dropped = dropped.iter().filter(|((crossing, _), _)| roads(crossing).iter().any(|road| of_ring.contains(road)));
+    let told = |((crossing, is_linked), _): &((Crossing, bool), bool)| {
         let names: Vec<String> = crossing.strips.iter().map(|&strip| network.name(strip)).collect();
-        format!("{} passes the ring by too far from it, and is left out", names.join(", "))
+        let why = match (is_linked, crossing.inwards) {
+            (true, _) => "passes the ring by too far from it",
+            (false, true) => "leads on to no lane that leads out, by the map's links; lanes are not changed",
+            (false, false) => "comes from no lane that leads in, by the map's links; lanes are not changed",
+        };
+        format!("{}: {why}, and it is left out", names.join(", "))
     };
     dropped.map(told).collect()
 }

@@ -8,7 +8,7 @@ use glam::DVec2;
 use super::cells::Cells;
 use super::lanes::Strip;
 use super::links::{Contact, contacts};
-use super::records::{Kind, Records};
+use super::records::{Concerns, Kind, Records, Warning};
 use super::sections::SHORTEST;
 
 /// A joint that jumps further is not believed (m).
@@ -27,7 +27,7 @@ pub(super) struct Graph {
     pub(super) next: Vec<Vec<usize>>,
     pub(super) previous: Vec<Vec<usize>>,
     /// Joints that were replaced or dropped, and why.
-    pub(super) warnings: Vec<String>,
+    pub(super) warnings: Vec<Warning>,
 }
 
 /// Where a lane begins or ends, and in which direction it is travelled there.
@@ -104,6 +104,11 @@ impl<'a> Places<'a> {
         contacts(self.records, &self.strips[strip], follow).into_iter().filter(move |contact| !names(contact))
     }
 
+    /// The id of a lane's road.
+    fn road(&self, index: usize) -> &str {
+        &self.records.roads[self.strips[index].road].id
+    }
+
     /// What a lane is called.
     fn name(&self, index: usize) -> String {
         self.records.lane_name(&self.strips[index])
@@ -135,6 +140,7 @@ impl Graph {
                 continue;
             }
             let misfit = misfit(&end, wrong.iter().filter_map(|&next| Some(ends[next]?[0])));
+            let mut is_lost = false;
             let instead = match nearest(&starts, &end, ends).filter(|&next| next != index) {
                 Some(next) if graph.next[index].contains(&next) => "it is left out".into(),
                 Some(next) => {
@@ -145,13 +151,15 @@ impl Graph {
                         format!("{}, which begins nearer, is taken instead", places.name(next))
                     }
                 }
-                None => "no lane begins near, so it is left out".to_owned(),
+                None => {
+                    is_lost = true;
+                    "no lane begins near, so it is left out".to_owned()
+                }
             };
-            graph.warnings.push(format!(
-                "{}: its link to {} {misfit}; {instead}",
-                places.name(index),
-                places.name(wrong[0])
-            ));
+            let text = format!("{}: its link to {} {misfit}; {instead}", places.name(index), places.name(wrong[0]));
+            // Where nothing else follows, an arm may be lost.
+            let concerns = if is_lost { Concerns::Road(places.road(index).to_owned()) } else { Concerns::Map };
+            graph.warnings.push(Warning { concerns, text });
         }
         // Many files say of a junction's lane where it comes from, but not of the lane before it where it leads.
         for (index, start) in ends.iter().enumerate() {
@@ -197,11 +205,11 @@ impl Graph {
                 let (from, to) = if follow { (index, other) } else { (other, index) };
                 if !self.next[from].contains(&to) {
                     self.next[from].push(to);
-                    self.warnings.push(format!(
+                    self.warnings.push(Warning::of_map(format!(
                         "{}: has no link to a lane, and is joined to {}, which begins there",
                         places.name(from),
                         places.name(to)
-                    ));
+                    )));
                 }
             }
         }

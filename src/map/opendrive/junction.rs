@@ -103,10 +103,12 @@ impl Map {
                 ends.sort_unstable();
                 ends.dedup();
             }
-            let arms: Vec<ArmLanes> =
-                exits.iter().map(|exit| ArmLanes { entries: Vec::new(), exits: vec![crossing(exit)] }).collect();
             let mut ways: Vec<Way> = Vec::new();
             for &entry in &entries {
+                // Of a lane from the junction to itself, the beginning is no way out.
+                let exits: Vec<usize> = exits.iter().copied().filter(|&exit| exit != entry).collect();
+                let arms: Vec<ArmLanes> =
+                    exits.iter().map(|exit| ArmLanes { entries: Vec::new(), exits: vec![crossing(exit)] }).collect();
                 let found = network.ways(&crossing(&entry), &arms).into_iter();
                 // Through this junction alone.
                 let through = |(_, way): &Lanes| way[1..way.len() - 1].iter().all(|strip| strips.contains(strip));
@@ -242,11 +244,9 @@ impl Map {
             let mut onward: Vec<String> =
                 onward.map(|&next| shown(&self.road_lane(&self.strips[next]).to_string())).collect();
             onward.dedup();
-            let expected = format!(
-                "no links of the map lead there; {} leads on to {}",
-                shown(&way.from.to_string()),
-                onward.join(", ")
-            );
+            let onward = if onward.is_empty() { "no lane".to_owned() } else { onward.join(", ") };
+            let from = shown(&way.from.to_string());
+            let expected = format!("no links of the map lead there; {from} leads on to {onward}");
             refused.error("to", shown(&way.to.to_string()), expected)
         })
     }

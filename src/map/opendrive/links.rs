@@ -1,7 +1,7 @@
 //! What a map says of the lanes that follow a lane, and where it says nothing although the roads are linked.
 
 use super::lanes::Strip;
-use super::records::{Link, Records, RoadRecord};
+use super::records::{Connection, Link, Records, RoadRecord};
 use super::xml::shown;
 
 /// A section of a road that a lane leads to or comes from.
@@ -61,6 +61,37 @@ pub(super) fn contacts(records: &Records, strip: &Strip, follow: bool) -> Vec<Co
 }
 
 impl Records {
+    /// What speaks against the hand of traffic: most lanes that the connections of junctions begin at lead away from
+    /// them. None where they agree.
+    pub(super) fn against_hand(&self) -> Option<String> {
+        let ways = self.junctions.iter().flat_map(|(id, connections)| connections.iter().map(move |way| (id, way)));
+        let leads = ways.filter(|(_, way)| !way.direct).flat_map(|(id, way)| self.leads_in(id, way));
+        let [away, all] = leads.fold([0, 0], |[away, all], leads_in| [away + usize::from(!leads_in), all + 1]);
+        let (hand, other) = if self.mirrored { ("left", "right") } else { ("right", "left") };
+        (all < 2 * away).then(|| {
+            format!(
+                "{away} of {all} lanes that connections of junctions begin at lead away from them in {hand}-hand \
+                 traffic: `--hand {other}` would do"
+            )
+        })
+    }
+
+    /// Whether each lane that a junction's connection begins at leads to the junction.
+    fn leads_in(&self, junction: &str, way: &Connection) -> Vec<bool> {
+        let Some(&road) = self.by_id.get(&way.incoming) else { return Vec::new() };
+        let road = &self.roads[road];
+        let is_at = |link: &Option<Link>| matches!(link, Some(Link::Junction(id)) if id == junction);
+        // A road from the junction to itself says nothing.
+        let [at_start, at_end] = [&road.predecessor, &road.successor].map(is_at);
+        if at_start == at_end {
+            return Vec::new();
+        }
+        let section = &road.sections[end_of(road, at_start)];
+        let from = way.lanes.iter().filter_map(|(from, _)| section.lanes.iter().find(|lane| lane.id == *from));
+        // Lanes to the right of the reference line are travelled along it.
+        from.map(|lane| ((lane.id < 0) != lane.reversed) == at_end).collect()
+    }
+
     /// What a lane is called in messages, by its number in the map.
     pub(super) fn lane_name(&self, strip: &Strip) -> String {
         let id = if self.mirrored { -strip.id } else { strip.id };

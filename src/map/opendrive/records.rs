@@ -16,10 +16,10 @@ pub(super) struct Cubic {
 }
 
 impl Cubic {
-    /// Value at station `s` (m).
+    /// Value at station `s`, before its beginning that at its beginning (m).
     pub(super) fn at(&self, s: f64) -> f64 {
         let [a, b, c, d] = self.factors;
-        let x = s - self.start;
+        let x = (s - self.start).max(0.0);
         a + x * (b + x * (c + x * d))
     }
 }

@@ -10,7 +10,7 @@ use super::cells::Cells;
 use super::graph::Graph;
 use super::lanes::Strip;
 use super::records::Kind;
-use super::surface::{GAP, of};
+use super::surface::{GAP, SLIVER, of, solid_islands};
 use crate::geometry::area::{Area, densified, points};
 use crate::geometry::fitted_circle;
 
@@ -51,9 +51,23 @@ pub struct Refused {
 }
 
 /// The roundabouts of a map, largest first, and the holes that were looked at and refused.
-pub(super) fn rings(strips: &[Strip], graph: &Graph) -> (Vec<Ring>, Vec<Refused>) {
+pub(super) fn rings(strips: &[Strip], islands: &[Vec<DVec2>], graph: &Graph) -> (Vec<Ring>, Vec<Refused>) {
     let drivable = of(strips.iter(), Kind::Lane).plus(&of(strips.iter(), Kind::Flat));
-    let paved = drivable.closed(GAP).minus(&of(strips.iter(), Kind::Kerb));
+    let solid = of(strips.iter(), Kind::Kerb).plus(&solid_islands(islands));
+    let (mut rings, refused) = rings_in(&drivable.closed(GAP).minus(&solid), strips, graph);
+    // Lanes that do not quite meet leave the island open, until what is between them is paved.
+    let (others, _) = rings_in(&drivable.closed(SLIVER).minus(&solid), strips, graph);
+    let is_new = |one: &Ring| rings.iter().all(|ring| ring.radius + one.radius < ring.centre.distance(one.centre));
+    let others: Vec<Ring> = others.into_iter().filter(is_new).collect();
+    let is_ring = |one: &Refused| others.iter().any(|ring| ring.centre.distance(one.centre) < ring.radius);
+    let refused = refused.into_iter().filter(|one| !is_ring(one)).collect();
+    rings.extend(others);
+    rings.sort_by(|one, other| other.radius.total_cmp(&one.radius));
+    (rings, refused)
+}
+
+/// The same of what is paved.
+fn rings_in(paved: &Area, strips: &[Strip], graph: &Graph) -> (Vec<Ring>, Vec<Refused>) {
     let holes: Vec<Area> = paved.holes().collect();
     let around: Vec<(DVec2, DVec2)> =
         holes.iter().map(Area::bounds).map(|(low, high)| (low - NEAR, high + NEAR)).collect();
@@ -65,7 +79,11 @@ pub(super) fn rings(strips: &[Strip], graph: &Graph) -> (Vec<Ring>, Vec<Refused>
         // A sliver between two lanes is no island, whatever surrounds it.
         let size = (hole.size() / std::f64::consts::PI).sqrt();
         let (low, high) = hole.bounds();
-        if size < 0.6 * RADII[0] || RADII[1] < radius || 4.0 * RADII[1] < (high - low).max_element() {
+        if size < 0.6 * RADII[0] {
+            continue;
+        }
+        if RADII[1] < radius || 4.0 * RADII[1] < (high - low).max_element() {
+            refused.push(Refused { centre, radius, reason: format!("its radius is above {} m", RADII[1]) });
             continue;
         }
         let (covered, against) = circulating(&traffic, hole, &outline, centre);

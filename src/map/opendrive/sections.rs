@@ -139,6 +139,10 @@ impl Source<'_, '_> {
             }
         };
         let name = attribute(node, "type");
+        // One that is linked to none is drivable ground, such as what lies between lanes.
+        if (name == "bidirectional" || attribute(node, "direction") == "both") && link.is_some() {
+            self.warn(node, "has traffic both ways; it is driven on one way, by the side that it lies on");
+        }
         let kind = Kind::named(name).unwrap_or_else(|| {
             *self.records.unknown_types.entry(name.to_owned()).or_default() += 1;
             Kind::Nothing

@@ -15,7 +15,7 @@ use crate::geometry::area::{Area, counter_clockwise, densified, points};
 /// Gaps between strips that are closed first (m).
 pub(super) const GAP: f64 = 0.02;
 /// Voids narrower than this are paved where they touch a lane (m).
-const SLIVER: f64 = 0.6;
+pub(super) const SLIVER: f64 = 0.6;
 /// A void that holds a circle of this radius is solid (m).
 const INSCRIBED: f64 = 0.5;
 /// The same of a void beside a lane in a map that has kerbs around all that is solid (m).
@@ -48,11 +48,16 @@ pub(super) fn of<'a>(strips: impl Iterator<Item = &'a Strip>, kind: Kind) -> Are
     Area::union(strips.filter(|strip| strip.kind == kind).flat_map(Strip::contours))
 }
 
+/// The union of islands that were given as outlines.
+pub(super) fn solid_islands(islands: &[Vec<DVec2>]) -> Area {
+    Area::union(islands.iter().cloned().map(counter_clockwise))
+}
+
 impl Surface {
     /// The surface of these strips, around islands that were given as outlines.
     pub(super) fn new(strips: &[Strip], islands: &[Vec<DVec2>]) -> Surface {
         let kind = |kind: Kind| of(strips.iter(), kind);
-        let kerbs = kind(Kind::Kerb).plus(&Area::union(islands.iter().cloned().map(counter_clockwise))).closed(GAP);
+        let kerbs = kind(Kind::Kerb).plus(&solid_islands(islands)).closed(GAP);
         let lanes = kind(Kind::Lane).closed(GAP).minus(&kerbs);
         let solid = strips.iter().filter(|strip| matches!(strip.kind, Kind::Solid | Kind::Apron));
         let solid = Area::union(solid.flat_map(Strip::contours)).minus(&lanes);

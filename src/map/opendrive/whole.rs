@@ -41,15 +41,15 @@ impl Records {
         (!self.unknown_types.is_empty()).then(|| format!("lane types that are not known: {list}{more}"))
     }
 
-    /// What is odd in the file that concerns a place with these roads.
-    pub(super) fn warnings_around(&self, network: &Network) -> impl Iterator<Item = &str> {
+    /// Which of some warnings concern a place with these roads.
+    pub(super) fn around<'a>(&self, warnings: &'a [Warning], network: &Network) -> impl Iterator<Item = &'a str> {
         let roads: HashSet<&str> = network.strips.values().map(|strip| self.roads[strip.road].id.as_str()).collect();
         let concerned = move |warning: &&Warning| match &warning.concerns {
             Concerns::Map => false,
             Concerns::Road(id) => roads.contains(id.as_str()),
             Concerns::EveryPlace => true,
         };
-        self.warnings.iter().filter(concerned).map(|warning| warning.text.as_str())
+        warnings.iter().filter(concerned).map(|warning| warning.text.as_str())
     }
 
     /// An error if a road begins too far from the others.

@@ -30,6 +30,11 @@ pub(super) fn check(reader: &Reader, road: &Road, text: &str) -> Result<(), Erro
     };
     let unread = |error: Error| reader.invalid("map", "not read back", format!("{KEEP}: {error}"));
     let found = found.map_err(unread)?.ground;
+    let (arms, others) = (own.arms.len(), found.arms.len());
+    if arms != others {
+        let expected = format!("as a map it has {others}; a road whose arms are farther apart would do");
+        return Err(reader.invalid("arms", arms, expected));
+    }
     let (routes, others) = (own.lines.len(), found.lines.len());
     if routes != others {
         let expected = format!("as a map it has {others}; a road whose arms are farther apart would do");
