@@ -4,9 +4,9 @@
 
 Needs ``offtrack-sim``, ``minari[arrow]`` and ``pillow``. The data set, ``offtrack/attard2023-attard2023-v0`` or
 ``--name``, lies where Minari keeps its own (``MINARI_DATASETS_PATH``), and none is overwritten: observations float32
-``[steps + 1, n_values]``, actions, rewards and both flags ``[steps]``, and of each episode its route and why it ended. The trucks are stepped together, on routes
-and from starts that are drawn; what is written of each is its first ``--episodes`` episodes, so that short ones, which
-are failures more often, are not drawn more often.
+``[steps + 1, n_values]``, actions, rewards and both flags ``[steps]``, and of each episode its route and why it ended.
+The trucks are stepped together, on routes and from starts that are drawn; what is written of each is its first
+``--episodes`` episodes, so that short ones, which are failures more often, are not drawn more often.
 """
 
 from __future__ import annotations
