@@ -15,6 +15,11 @@ pub fn named(network: &str, parameters: &Mlp) -> Named {
     parameters.parameters().into_iter().map(|(name, values)| (format!("{network}, {name}"), values)).collect()
 }
 
+/// The first number that is not finite: its name and value.
+pub fn first_broken(columns: Named) -> Option<(String, f32)> {
+    columns.into_iter().find_map(|(name, values)| Some((name, values.into_iter().find(|value| !value.is_finite())?)))
+}
+
 /// The moments of an optimizer whose parameters these are; none before its first step.
 pub fn moments(parameters: &Named, state: State) -> Named {
     let pairs = parameters.iter().zip(state.moments);

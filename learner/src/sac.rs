@@ -20,6 +20,7 @@ use rand::rngs::SmallRng;
 
 use crate::adam::Adam;
 use crate::checkpoint::{Columns, Stored};
+use crate::columns::first_broken;
 use crate::config::Learning;
 use crate::error::Error;
 use crate::exchange::{Actor, Sample, TdErrors};
@@ -93,6 +94,11 @@ pub struct Update {
 }
 
 impl Update {
+    /// Its values in the order of its fields.
+    fn of([critic_loss, actor_loss, entropy, value]: Figures) -> Update {
+        Update { critic_loss, actor_loss, entropy, value }
+    }
+
     /// The sums of both.
     pub fn plus(&self, other: &Update) -> Update {
         Update {
@@ -210,15 +216,15 @@ impl Learner for Sac {
     }
 
     fn take_sums(&mut self) -> (Update, u64) {
-        (update(take(&mut self.sums)), take(&mut self.n_summed))
+        (Update::of(take(&mut self.sums)), take(&mut self.n_summed))
     }
 
     fn diverged(&self) -> Option<(&'static str, f32)> {
-        not_finite(&update(self.sums))
+        not_finite(&Update::of(self.sums))
     }
 
     fn broken(&self) -> Option<(String, f32)> {
-        self.first_broken()
+        first_broken(self.numbers())
     }
 
     fn save(&self, columns: &mut Columns) {
@@ -269,10 +275,6 @@ pub fn not_finite(update: &Update) -> Option<(&'static str, f32)> {
 
 fn added(sums: &Figures, figures: &Figures) -> Figures {
     std::array::from_fn(|n| sums[n] + figures[n])
-}
-
-fn update([critic_loss, actor_loss, entropy, value]: [f32; 4]) -> Update {
-    Update { critic_loss, actor_loss, entropy, value }
 }
 
 #[cfg(test)]

@@ -8,17 +8,20 @@ mod mode;
 mod plot;
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Instant, SystemTime};
 
 use indicatif::{ProgressBar, ProgressStyle};
 use offtrack::layout::N_RAYS;
 use offtrack::scenario::Split;
+use offtrack::world::World;
 use serde::Serialize;
 
 use measure::{Measured, measured};
 pub(crate) use measure::{median, rounded};
 use mode::{Learner, Mode, Setting};
-use offtrack_commands::{devices as device, outputs, roads};
+use offtrack_commands::{devices, outputs, roads};
+use offtrack_evaluation::device::Device;
 use offtrack_evaluation::files;
 use offtrack_evaluation::provenance;
 use offtrack_learner::error::Error;
@@ -35,7 +38,7 @@ const FACTOR: usize = 4;
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    device: device::Choice,
+    device: devices::Choice,
     /// Numbers of trucks, separated by commas; `256..1048576` is a range in steps of four times as many.
     #[arg(long, default_value = "64,256,1024,4096,16384")]
     envs: String,
@@ -152,28 +155,8 @@ impl Run {
 /// Runs the command.
 pub fn run(args: &Args) -> Result<(), Error> {
     let envs = sizes(&args.envs)?;
-    if !(0.1..=3600.0).contains(&args.seconds) {
-        return Err(Error::setting("--seconds", format!("{} s", args.seconds), "must lie in 0.1..3600 s"));
-    }
-    if let Some(file) = &args.plot {
-        offtrack_commands::plot::check("--plot", file)?;
-    }
-    if let Some(file) = args.config.as_ref().filter(|_| !args.mode.contains(&Mode::Training)) {
-        let expected = "is for --mode training: add that mode, or leave --config out".to_owned();
-        return Err(Error::setting("--config", file.display().to_string(), expected));
-    }
-    if let Some(submission) =
-        args.submission.filter(|_| args.device.is_processor() || !args.mode.contains(&Mode::Random))
-    {
-        let expected = "is for --mode random on a device: add --device gpu and that mode, or leave it out".to_owned();
-        return Err(Error::setting("--submission", submission.to_string(), expected));
-    }
-    let submission = args.submission.unwrap_or(SUBMISSION);
-    outputs::distinct(
-        &[("--json", args.json.as_deref()), ("--plot", args.plot.as_deref())],
-        &[("--config", args.config.as_deref()), ("--benchmark", Some(Path::new(&args.benchmark)))],
-    )?;
-    let mut device = args.device.open()?;
+    check(args)?;
+    let device = args.device.open()?;
     let start = Instant::now();
     let scenario = roads::benchmark(&args.benchmark)?;
     let drawn = start.elapsed();
@@ -209,54 +192,89 @@ pub fn run(args: &Args) -> Result<(), Error> {
         routes: world.routes.len(),
         seconds_to_read: drawn.as_secs_f64(),
         seconds_to_bake: baked.as_secs_f64(),
-        submission,
+        submission: args.submission.unwrap_or(SUBMISSION),
         runs: Vec::new(),
     };
     files::print(&heading(&scale, &device))?;
+    let routes = Split::ALL.map(|split| scenario.split(split)).concat();
+    let place = Place { world, routes, learner };
+    measure_all(args, &envs, &place, device, &mut scale)
+}
+
+/// An error for flags that cannot be used, or not together.
+fn check(args: &Args) -> Result<(), Error> {
+    if !(0.1..=3600.0).contains(&args.seconds) {
+        return Err(Error::setting("--seconds", format!("{} s", args.seconds), "must lie in 0.1..3600 s"));
+    }
+    if let Some(file) = &args.plot {
+        offtrack_commands::plot::check("--plot", file)?;
+    }
+    if let Some(file) = args.config.as_ref().filter(|_| !args.mode.contains(&Mode::Training)) {
+        let expected = "is for --mode training: add that mode, or leave --config out".to_owned();
+        return Err(Error::setting("--config", file.display().to_string(), expected));
+    }
+    if let Some(submission) =
+        args.submission.filter(|_| args.device.is_processor() || !args.mode.contains(&Mode::Random))
+    {
+        let expected = "is for --mode random on a device: add --device gpu and that mode, or leave it out".to_owned();
+        return Err(Error::setting("--submission", submission.to_string(), expected));
+    }
+    Ok(outputs::distinct(
+        &[("--json", args.json.as_deref()), ("--plot", args.plot.as_deref())],
+        &[("--config", args.config.as_deref()), ("--benchmark", Some(Path::new(&args.benchmark)))],
+    )?)
+}
+
+/// Where trucks drive, and by what.
+struct Place {
+    world: Arc<World>,
+    routes: Vec<u32>,
+    /// The learner of modes with a network.
+    learner: Option<Learner>,
+}
+
+/// Measures each number of trucks in each mode, and writes what is known after each. An error where none could be
+/// measured.
+fn measure_all(args: &Args, envs: &[usize], place: &Place, mut device: Device, scale: &mut Scale) -> Result<(), Error> {
     let bar = ProgressBar::new((envs.len() * args.mode.len()) as u64).with_style(
         ProgressStyle::with_template("measuring {bar:30} {pos}/{len} {msg}, {elapsed}")
             .unwrap_or_else(|_| ProgressStyle::default_bar()),
     );
-    let routes = Split::ALL.map(|split| scenario.split(split)).concat();
     let (mut refusal, mut backend) = (None, None);
-    for &envs in &envs {
-        for &mode in &args.mode {
-            bar.set_message(format!("{envs} trucks, {}", mode.name()));
-            bar.tick();
-            let (engine, adapter) = (&device.engine, device.adapter());
-            let setting = Setting {
-                engine,
-                adapter,
-                backend: &mut backend,
-                world: &world,
-                routes: &routes,
-                envs,
-                submission: submission as usize,
-                learner: learner.as_ref(),
-            };
-            let work = || measured(&mut mode.driven(setting)?, args.seconds);
-            // The tensor library panics where a device fails.
-            let outcome = if device.adapter().is_some() { panics::caught(work, || None) } else { work() };
-            let outcome = match outcome {
-                Ok(measured) => Outcome::Measured(Box::new(measured)),
-                Err(error) => {
-                    // A broken device must not spoil the next size.
-                    (device, backend) = (args.device.open()?, None);
-                    let outcome = Outcome::Refused { error: error.to_string() };
-                    refusal.get_or_insert(error);
-                    outcome
-                }
-            };
-            let run = Run { mode, envs, outcome };
-            bar.suspend(|| files::print(&row(&run)))?;
-            scale.runs.push(run);
-            bar.inc(1);
-            write(args, &scale, &device.title())?;
-        }
+    for (&envs, &mode) in envs.iter().flat_map(|envs| args.mode.iter().map(move |mode| (envs, mode))) {
+        bar.set_message(format!("{envs} trucks, {}", mode.name()));
+        bar.tick();
+        let setting = Setting {
+            engine: &device.engine,
+            adapter: device.adapter(),
+            backend: &mut backend,
+            world: &place.world,
+            routes: &place.routes,
+            envs,
+            submission: scale.submission as usize,
+            learner: place.learner.as_ref(),
+        };
+        let work = || measured(&mut mode.driven(setting)?, args.seconds);
+        // The tensor library panics where a device fails.
+        let outcome = if device.adapter().is_some() { panics::caught(work, || None) } else { work() };
+        let outcome = match outcome {
+            Ok(measured) => Outcome::Measured(Box::new(measured)),
+            Err(error) => {
+                // A broken device must not spoil the next size.
+                (device, backend) = (args.device.open()?, None);
+                let outcome = Outcome::Refused { error: error.to_string() };
+                refusal.get_or_insert(error);
+                outcome
+            }
+        };
+        let run = Run { mode, envs, outcome };
+        bar.suspend(|| files::print(&row(&run)))?;
+        scale.runs.push(run);
+        bar.inc(1);
+        write(args, scale, &device.title())?;
     }
     bar.finish_and_clear();
     match refusal {
-        // Nothing could be measured.
         Some(error) if scale.runs.iter().all(|run| run.measured().is_none()) => Err(error),
         _ => Ok(()),
     }
@@ -298,7 +316,7 @@ fn write(args: &Args, scale: &Scale, title: &str) -> Result<(), Error> {
     Ok(())
 }
 
-fn heading(scale: &Scale, device: &offtrack_evaluation::device::Device) -> String {
+fn heading(scale: &Scale, device: &Device) -> String {
     let Step { dt, substeps, values, holds, .. } = &scale.step;
     let threads = if scale.engine == "cpu" { format!(", {} threads", scale.threads) } else { String::new() };
     let names: String = measure::STAGE_NAMES.iter().map(|name| format!(" {name:>7}")).collect();

@@ -124,8 +124,9 @@ fn a_run_that_begins_again_for_want_of_a_checkpoint_has_no_rows_of_before() {
     let run = begun(&place, endless(&place));
     wait_until("a checkpoint", || place.file("runs/run/checkpoint.safetensors").is_file());
     ended(run, "-KILL");
+    // As if it had been killed while it wrote its first checkpoint, after a row: the policy comes after it.
     std::fs::remove_file(place.file("runs/run/checkpoint.safetensors")).unwrap();
-    // As if it had been killed while it wrote its first checkpoint, after a row.
+    let _ = std::fs::remove_file(place.file("runs/run/policy.safetensors"));
     let file = place.file("runs/run/metrics.csv");
     let metrics = std::fs::read_to_string(&file).unwrap();
     let row = format!("5.0,999999{}", ",".repeat(metrics.lines().next().unwrap().matches(',').count() - 1));

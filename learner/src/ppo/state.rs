@@ -4,7 +4,7 @@ use burn::tensor::Device;
 
 use super::Ppo;
 use crate::checkpoint::{Columns, Stored};
-use crate::columns::{Named, moments, named, network, optimizer};
+use crate::columns::{Named, first_broken, moments, named, network, optimizer};
 use crate::error::Error;
 use crate::generator::Generator;
 use crate::sac::Update;
@@ -59,9 +59,7 @@ impl Ppo {
 
     /// The first of the learner's numbers that is not finite: its name and value.
     pub fn broken(&self) -> Option<(String, f32)> {
-        self.numbers()
-            .into_iter()
-            .find_map(|(name, values)| Some((name, values.into_iter().find(|value| !value.is_finite())?)))
+        first_broken(self.numbers())
     }
 
     fn numbers(&self) -> Named {

@@ -12,6 +12,9 @@ use offtrack_evaluation::run_file::RunFile;
 /// Maximum length of a run's name: a file system's, 255, less what is put after it.
 const LONGEST_NAME: usize = 200;
 
+/// Most bytes of a report that are read.
+pub const REPORT_LIMIT: u64 = 64 << 20;
+
 /// Where a run writes.
 #[derive(Debug)]
 pub struct Folder(PathBuf);

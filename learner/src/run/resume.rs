@@ -5,15 +5,12 @@ use std::path::Path;
 use offtrack::files::reader::read_bytes;
 use serde_json::Value;
 
-use super::folder::Folder;
+use super::folder::{Folder, REPORT_LIMIT};
 use super::metrics_file::MetricsFile;
 use super::progress;
 use crate::checkpoint::Stored;
 use crate::config::{Config, Device, Flags};
 use crate::error::Error;
-
-/// Most bytes of a report.
-const REPORT_LIMIT: u64 = 64 << 20;
 
 /// A run in its folder.
 #[derive(Debug)]

@@ -311,7 +311,7 @@ impl Learner for DeviceSac {
         let sums = self.read(place, N_SUMS);
         let offset = u64::from(place) * size_of::<f32>() as u64;
         self.gpu.queue.write_buffer(&self.memory.buffer, offset, &[0; N_SUMS * size_of::<f32>()]);
-        (super::update([sums[0], sums[1], sums[2], sums[3]]), std::mem::take(&mut self.n_summed))
+        (Update::of([sums[0], sums[1], sums[2], sums[3]]), std::mem::take(&mut self.n_summed))
     }
 
     /// None: the figures are not at hand.

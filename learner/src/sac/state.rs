@@ -52,12 +52,6 @@ impl Sac {
         Ok(())
     }
 
-    pub(super) fn first_broken(&self) -> Option<(String, f32)> {
-        self.numbers()
-            .into_iter()
-            .find_map(|(name, values)| Some((name, values.into_iter().find(|value| !value.is_finite())?)))
-    }
-
     pub(super) fn numbers(&self) -> Named {
         let networks = [named("actor", &self.actor), critics_named(&self.critics)];
         let states = [&self.actor_optimizer, &self.critic_optimizer].map(|optimizer| optimizer.state());

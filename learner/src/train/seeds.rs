@@ -14,11 +14,8 @@ use super::event::{Caller, Event};
 use super::{Opened, Training};
 use crate::config::Config;
 use crate::error::Error;
-use crate::run::folder::{self, Folder};
+use crate::run::folder::{self, Folder, REPORT_LIMIT};
 use crate::run::resume::Resumed;
-
-/// Most bytes of a report.
-const REPORT_LIMIT: u64 = 64 << 20;
 
 /// What several seeds came to.
 #[derive(Debug)]
