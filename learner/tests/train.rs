@@ -297,7 +297,7 @@ fn a_run_continues_without_the_policy_that_it_began_with_and_without_its_rows() 
     let outcome = resume(&second, None, Some(6000), &watcher, &AtomicBool::new(false)).unwrap();
     assert!(outcome.evaluation.is_some());
     let warnings = warnings.into_inner().unwrap();
-    assert!(warnings.len() == 1 && warnings[0].contains("metrics.csv: is missing"), "{warnings:?}");
+    assert!(warnings.len() == 1 && warnings[0].contains("metrics.csv: was missing"), "{warnings:?}");
     let metrics = std::fs::read_to_string(second.join("metrics.csv")).unwrap();
     let env_steps = metrics.lines().nth(1).and_then(|row| row.split(',').nth(1)).map(str::parse::<u64>);
     assert!(env_steps.is_some_and(|steps| 4000 < steps.unwrap()), "{metrics}");
