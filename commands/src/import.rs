@@ -328,8 +328,10 @@ fn check(file: &Path, map: &Map, choice: &Choice) -> Result<(), Error> {
         map.rings().iter().map(|ring| map.ground(ring, &Options { arms: choice.arms.clone() })).collect()
     };
     // A ring below a bridge is not found.
-    for bridge in if places.is_empty() { map.bridges() } else { Vec::new() } {
-        let _ = writeln!(text, "{bridge}");
+    if places.is_empty() {
+        map.bridges().iter().for_each(|bridge| {
+            let _ = writeln!(text, "{bridge}");
+        });
     }
     for place in &places {
         match place {

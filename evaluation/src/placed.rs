@@ -96,8 +96,8 @@ type Observed = (Vec<[f32; N_VALUES]>, Vec<[f32; N_EXTRAS]>, Vec<[f32; N_AROUND]
 /// What these trucks observe, as far as a policy reads it.
 fn observed(policy: &Policy, batch: &Batch, driving: &[usize]) -> Observed {
     let (observations, extras) = driving.iter().map(|&env| (batch.observation[env], batch.extras[env])).unzip();
-    let seeing = driving.iter().filter(|_| policy.reads_vehicles());
-    (observations, extras, seeing.map(|&env| batch.around[env]).collect())
+    let seeing = if policy.reads_vehicles() { driving } else { &[] };
+    (observations, extras, seeing.iter().map(|&env| batch.around[env]).collect())
 }
 
 /// The best actions by a policy's outputs: the indices of the largest, or the commands.

@@ -22,7 +22,8 @@ pub enum Error {
     },
     /// A group of trucks is drawn on a road where each begins in a lane of its own.
     #[error(
-        "routes: they begin in {n_lanes} of the lanes of {road}; a group of {group} trucks (traffic.group) needs as many"
+        "routes: they begin in {n_lanes} of the lanes of {road}; a group of {group} trucks (traffic.group) needs as \
+         many"
     )]
     NarrowGroup {
         /// The road.

@@ -29,17 +29,12 @@ impl ObservationLayout {
 
     /// Values in all.
     pub const fn n_values(self) -> usize {
-        self.vehicles_at() + self.n_vehicle_values()
+        self.vehicles_at() + if self.has_vehicles { N_AROUND } else { 0 }
     }
 
     /// Index of the first value of other vehicles.
     pub const fn vehicles_at(self) -> usize {
         N_VALUES + self.n_extras
-    }
-
-    /// Values of other vehicles.
-    pub const fn n_vehicle_values(self) -> usize {
-        if self.has_vehicles { N_AROUND } else { 0 }
     }
 
     /// Whether there are the [`N_VALUES`] values alone.

@@ -109,9 +109,7 @@ impl Map {
             Reader::of(file).invalid("road", "more than 2000 km or 10 million points of lanes", expected)
         })?;
         let graph = Graph::new(&records, &strips);
-        let islands: Vec<Vec<DVec2>> =
-            records.roads.iter().flat_map(|road| &road.islands).map(|island| island.corners.clone()).collect();
-        let (rings, refused) = rings::rings(&strips, &islands, &graph);
+        let (rings, refused) = rings::rings(&records, &strips, &graph);
         Ok(Map { file: file.to_owned(), records, strips, graph, rings, refused })
     }
 

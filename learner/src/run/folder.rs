@@ -134,17 +134,21 @@ pub fn make(runs: &Path, name: Option<&str>, config_file: &Path) -> Result<PathB
     }
 }
 
+/// Whether the name of a run's folder may have this character.
+fn is_plain_char(c: char) -> bool {
+    c.is_ascii_alphanumeric() || "-_.".contains(c)
+}
+
 /// Whether a run's folder may have this name.
 pub(crate) fn is_plain(name: &str) -> bool {
-    name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c))
-        && !name.starts_with('.')
-        && (1..=LONGEST_NAME).contains(&name.len())
+    name.chars().all(is_plain_char) && !name.starts_with('.') && (1..=LONGEST_NAME).contains(&name.len())
 }
 
 /// A name that a run's folder may have, also with a number behind it, as near to another as can be.
 fn plain(name: &str) -> String {
-    let plain = |c: char| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '-' };
-    let name: String = name.trim_start_matches('.').chars().map(plain).take(LONGEST_NAME - 11).collect();
+    let near = |c: char| if is_plain_char(c) { c } else { '-' };
+    // A hyphen and the ten digits of a number come behind it.
+    let name: String = name.trim_start_matches('.').chars().map(near).take(LONGEST_NAME - 11).collect();
     if name.is_empty() { "run".to_owned() } else { name }
 }
 

@@ -110,6 +110,8 @@ pub struct Progress<'a> {
     tried: (f64, u64),
     /// When the display was last updated, and the steps and updates by then.
     shown: (Instant, u64, u64),
+    /// What it showed then.
+    last: Option<Status>,
     display: Box<dyn Display + 'a>,
     metrics: MetricsFile,
     /// The rows of `metrics` for TensorBoard.
@@ -138,6 +140,7 @@ impl<'a> Progress<'a> {
             row_updates: 0,
             tried: (0.0, 0),
             shown: (Instant::now(), 0, 0),
+            last: None,
             display,
             metrics,
             events: None,
@@ -253,8 +256,7 @@ impl<'a> Progress<'a> {
 
     /// Writes the last row, of what is in no row yet, and closes the display.
     pub fn finish(&mut self, entropy_coefficient: f32) -> Result<(), Error> {
-        // What was shown just now has no rates to show again.
-        if self.shown.1 < self.env_steps {
+        if self.last.as_ref().is_none_or(|last| last.env_steps < self.env_steps || last.validation != self.validation) {
             self.show();
         }
         self.display.close();
@@ -313,8 +315,11 @@ impl<'a> Progress<'a> {
     fn show(&mut self) {
         let (since, steps, updates) =
             std::mem::replace(&mut self.shown, (Instant::now(), self.env_steps, self.updates));
-        let [steps_per_second, updates_per_second] =
-            per_second(since.elapsed().as_secs_f64(), [self.env_steps - steps, self.updates - updates]);
+        let [steps_per_second, updates_per_second] = match &self.last {
+            // No step since: the latest rates stand.
+            Some(last) if steps == self.env_steps => [last.steps_per_second, last.updates_per_second],
+            _ => per_second(since.elapsed().as_secs_f64(), [self.env_steps - steps, self.updates - updates]),
+        };
         let fraction = self.fraction();
         let names = self.unwritten.iter().filter_map(|file| Some(file.file_name()?.to_string_lossy().into_owned()));
         let status = Status {
@@ -329,6 +334,7 @@ impl<'a> Progress<'a> {
             unwritten: names.collect(),
         };
         self.display.show(&status);
+        self.last = Some(status);
     }
 
     /// Adds the counters' columns.
@@ -383,3 +389,6 @@ pub fn reached(stored: &Stored) -> Result<(f64, u64), Error> {
     let [env_steps, ..] = stored.array::<u64, 6>(COUNTS)?;
     Ok((seconds, env_steps))
 }
+
+#[cfg(test)]
+mod tests;

@@ -329,13 +329,13 @@ fn drop_passing_lanes(crossings: &mut Vec<Crossing>, network: &Network, reach: f
         false => ArmLanes { entries: Vec::new(), exits: vec![crossing.clone()] },
     };
     let lanes: Vec<ArmLanes> = crossings.iter().map(alone).collect();
-    let mut used = vec![false; lanes.len()];
-    let mut is_linked = used.clone();
+    // Of the ways that begin or end on each, how near one comes to the centre; infinitely far without any (m).
+    let mut nearest = vec![f64::INFINITY; lanes.len()];
     for (entry, crossing) in crossings.iter().enumerate().filter(|(_, crossing)| crossing.inwards) {
         for ((exit, _), way) in network.ways(crossing, &lanes) {
-            (is_linked[entry], is_linked[exit]) = (true, true);
-            if network.nearest_to_centre(&way) < reach {
-                (used[entry], used[exit]) = (true, true);
+            let near = network.nearest_to_centre(&way);
+            for end in [entry, exit] {
+                nearest[end] = near.min(nearest[end]);
             }
         }
     }
@@ -343,13 +343,13 @@ fn drop_passing_lanes(crossings: &mut Vec<Crossing>, network: &Network, reach: f
         crossing.strips.iter().filter_map(|strip| Some(network.strips.get(strip)?.road)).collect()
     };
     let (kept, dropped): (Vec<_>, Vec<_>) =
-        std::mem::take(crossings).into_iter().zip(is_linked).zip(used).partition(|(_, used)| *used);
-    *crossings = kept.into_iter().map(|((crossing, _), _)| crossing).collect();
+        std::mem::take(crossings).into_iter().zip(nearest).partition(|(_, nearest)| *nearest < reach);
+    *crossings = kept.into_iter().map(|(crossing, _)| crossing).collect();
     let of_ring: Vec<usize> = crossings.iter().flat_map(roads).collect();
-    let dropped = dropped.iter().filter(|((crossing, _), _)| roads(crossing).iter().any(|road| of_ring.contains(road)));
-    let told = |((crossing, is_linked), _): &((Crossing, bool), bool)| {
+    let dropped = dropped.iter().filter(|(crossing, _)| roads(crossing).iter().any(|road| of_ring.contains(road)));
+    let told = |(crossing, nearest): &(Crossing, f64)| {
         let names: Vec<String> = crossing.strips.iter().map(|&strip| network.name(strip)).collect();
-        let why = match (is_linked, crossing.inwards) {
+        let why = match (nearest.is_finite(), crossing.inwards) {
             (true, _) => "passes the ring by too far from it",
             (false, true) => "leads on to no lane that leads out, by the map's links; lanes are not changed",
             (false, false) => "comes from no lane that leads in, by the map's links; lanes are not changed",

@@ -140,8 +140,8 @@ impl Graph {
                 continue;
             }
             let misfit = misfit(&end, wrong.iter().filter_map(|&next| Some(ends[next]?[0])));
-            let mut is_lost = false;
-            let instead = match nearest(&starts, &end, ends).filter(|&next| next != index) {
+            let near = nearest(&starts, &end, ends).filter(|&next| next != index);
+            let instead = match near {
                 Some(next) if graph.next[index].contains(&next) => "it is left out".into(),
                 Some(next) => {
                     graph.next[index].push(next);
@@ -151,14 +151,11 @@ impl Graph {
                         format!("{}, which begins nearer, is taken instead", places.name(next))
                     }
                 }
-                None => {
-                    is_lost = true;
-                    "no lane begins near, so it is left out".to_owned()
-                }
+                None => "no lane begins near, so it is left out".to_owned(),
             };
             let text = format!("{}: its link to {} {misfit}; {instead}", places.name(index), places.name(wrong[0]));
             // Where nothing else follows, an arm may be lost.
-            let concerns = if is_lost { Concerns::Road(places.road(index).to_owned()) } else { Concerns::Map };
+            let concerns = if near.is_none() { Concerns::Road(places.road(index).to_owned()) } else { Concerns::Map };
             graph.warnings.push(Warning { concerns, text });
         }
         // Many files say of a junction's lane where it comes from, but not of the lane before it where it leads.

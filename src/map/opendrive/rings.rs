@@ -9,7 +9,7 @@ use glam::DVec2;
 use super::cells::Cells;
 use super::graph::Graph;
 use super::lanes::Strip;
-use super::records::Kind;
+use super::records::{Kind, Records};
 use super::surface::{GAP, SLIVER, of, solid_islands};
 use crate::geometry::area::{Area, densified, points};
 use crate::geometry::fitted_circle;
@@ -51,9 +51,9 @@ pub struct Refused {
 }
 
 /// The roundabouts of a map, largest first, and the holes that were looked at and refused.
-pub(super) fn rings(strips: &[Strip], islands: &[Vec<DVec2>], graph: &Graph) -> (Vec<Ring>, Vec<Refused>) {
+pub(super) fn rings(records: &Records, strips: &[Strip], graph: &Graph) -> (Vec<Ring>, Vec<Refused>) {
     let drivable = of(strips.iter(), Kind::Lane).plus(&of(strips.iter(), Kind::Flat));
-    let solid = of(strips.iter(), Kind::Kerb).plus(&solid_islands(islands));
+    let solid = of(strips.iter(), Kind::Kerb).plus(&solid_islands(records.islands().cloned()));
     let (mut rings, refused) = rings_in(&drivable.closed(GAP).minus(&solid), strips, graph);
     // Lanes that do not quite meet leave the island open, until what is between them is paved.
     let (others, _) = rings_in(&drivable.closed(SLIVER).minus(&solid), strips, graph);

@@ -49,13 +49,13 @@ pub(super) fn of<'a>(strips: impl Iterator<Item = &'a Strip>, kind: Kind) -> Are
 }
 
 /// The union of islands that were given as outlines.
-pub(super) fn solid_islands(islands: &[Vec<DVec2>]) -> Area {
-    Area::union(islands.iter().cloned().map(counter_clockwise))
+pub(super) fn solid_islands(islands: impl Iterator<Item = Vec<DVec2>>) -> Area {
+    Area::union(islands.map(counter_clockwise))
 }
 
 impl Surface {
     /// The surface of these strips, around islands that were given as outlines.
-    pub(super) fn new(strips: &[Strip], islands: &[Vec<DVec2>]) -> Surface {
+    pub(super) fn new(strips: &[Strip], islands: impl Iterator<Item = Vec<DVec2>>) -> Surface {
         let kind = |kind: Kind| of(strips.iter(), kind);
         let kerbs = kind(Kind::Kerb).plus(&solid_islands(islands)).closed(GAP);
         let lanes = kind(Kind::Lane).closed(GAP).minus(&kerbs);

@@ -32,11 +32,10 @@ pub(super) fn moved(points: &[DVec2], centre: DVec2) -> Vec<DVec2> {
 
 /// The surface of the map around a point, which becomes the origin, up to `extent` from it and a little more (m).
 pub(super) fn surface(map: &Map, centre: DVec2, extent: f64) -> Surface {
-    let islands = map.records.roads.iter().flat_map(|road| &road.islands).map(|island| moved(&island.corners, centre));
     let is_near = |island: &Vec<DVec2>| island.iter().any(|corner| corner.length() < extent + MARGIN);
-    let islands: Vec<Vec<DVec2>> = islands.filter(is_near).collect();
+    let islands = map.records.islands().map(|island| moved(island, centre)).filter(is_near);
     let strips: Vec<Strip> = nearby(map, centre, extent, FINE).into_iter().map(|(_, strip)| strip).collect();
-    Surface::new(&strips, &islands)
+    Surface::new(&strips, islands)
 }
 
 /// The parts of a surface within `extent` of the origin, clipped to that circle.

@@ -3,6 +3,8 @@
 
 use std::collections::HashSet;
 
+use glam::DVec2;
+
 use super::paths::Network;
 use super::records::{Concerns, Connection, Link, Records, Warning};
 use super::xml::shown;
@@ -41,6 +43,11 @@ impl Records {
         (!self.unknown_types.is_empty()).then(|| format!("lane types that are not known: {list}{more}"))
     }
 
+    /// The outlines of traffic islands that are objects (m).
+    pub(super) fn islands(&self) -> impl Iterator<Item = &Vec<DVec2>> {
+        self.roads.iter().flat_map(|road| &road.islands).map(|island| &island.corners)
+    }
+
     /// Which of some warnings concern a place with these roads.
     pub(super) fn around<'a>(&self, warnings: &'a [Warning], network: &Network) -> impl Iterator<Item = &'a str> {
         let roads: HashSet<&str> = network.strips.values().map(|strip| self.roads[strip.road].id.as_str()).collect();
@@ -54,13 +61,13 @@ impl Records {
 
     /// An error if a road begins too far from the others.
     fn check_extent(&self, reader: &Reader) -> Result<(), Error> {
-        let middle = |axis: fn(glam::DVec2) -> f64| {
+        let middle = |axis: fn(DVec2) -> f64| {
             let mut all: Vec<f64> =
                 self.roads.iter().filter_map(|road| road.plan.first()).map(|piece| axis(piece.origin)).collect();
             all.sort_by(f64::total_cmp);
             all.get(all.len() / 2).copied().unwrap_or(0.0)
         };
-        let middle = glam::DVec2::new(middle(|p| p.x), middle(|p| p.y));
+        let middle = DVec2::new(middle(|p| p.x), middle(|p| p.y));
         for road in &self.roads {
             if let Some(piece) = road.plan.iter().find(|piece| FARTHEST < piece.origin.distance(middle)) {
                 let key = format!("road {}, geometry s {}: x and y", shown(&road.id), piece.start);

@@ -30,15 +30,13 @@ pub(super) fn check(reader: &Reader, road: &Road, text: &str) -> Result<(), Erro
     };
     let unread = |error: Error| reader.invalid("map", "not read back", format!("{KEEP}: {error}"));
     let found = found.map_err(unread)?.ground;
-    let (arms, others) = (own.arms.len(), found.arms.len());
-    if arms != others {
-        let expected = format!("as a map it has {others}; a road whose arms are farther apart would do");
-        return Err(reader.invalid("arms", arms, expected));
-    }
-    let (routes, others) = (own.lines.len(), found.lines.len());
-    if routes != others {
-        let expected = format!("as a map it has {others}; a road whose arms are farther apart would do");
-        return Err(reader.invalid("routes", routes, expected));
+    for (key, has, others) in
+        [("arms", own.arms.len(), found.arms.len()), ("routes", own.lines.len(), found.lines.len())]
+    {
+        if has != others {
+            let expected = format!("as a map it has {others}; a road whose arms are farther apart would do");
+            return Err(reader.invalid(key, has, expected));
+        }
     }
     let within = if road.has_ring() { own.island_radius } else { own.outer_radius.min(found.outer_radius) };
     let reach = within + REACH - MARGIN;
